@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import ctypes
 import json
+import math
 import sys
 import threading
 import zlib
 from _thread import interrupt_main
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import wraps
+from functools import partial, wraps
 from typing import Any, ClassVar
 
 from pythonfmu.enums import Fmi2Status
@@ -23,6 +24,7 @@ from pythonfmu.fmi2slave import Fmi2Slave
 
 from trpac_core.files import FileError, parse_json, quoted
 from trpac_core.parameters.variables import Kind, Variable
+from trpac_core.sensors import LONGEST_STEP_S
 
 from .host import end_in_order
 
@@ -37,6 +39,9 @@ MOST_STATE_BYTES = 16_000_000
 """Largest serialised state that is read; those of the unit have 0.1 MB and the path of a picture [bytes]."""
 MOST_INTEGER = 1 << 31
 """Integers of FMI 2.0 have 32 bits."""
+GREATEST_JUMP = 0.5
+"""Greatest distance of a communication point from the end of the last step, as a part of the step: hosts round their
+times, some to single precision; a step that is left out or taken twice is twice as far away [-]."""
 PYTHON: dict[Kind, Callable[[Any], Value]] = {
     Kind.REAL: float,
     Kind.INTEGER: int,
@@ -72,7 +77,7 @@ def guarded(fallback: Callable[..., Any]) -> Callable[[Callable[..., Any]], Call
 
 
 def settled(callback: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a callback to clear an error that C code left pending, by raising and catching another one."""
+    """Decorate a function to clear an error that C code left pending, by raising and catching another one."""
 
     @wraps(callback)
     def run(self: GuardedSlave, *arguments: Any) -> Any:
@@ -112,6 +117,25 @@ def holes(items: list[Any]) -> list[int]:
     return [
         index for index, item in enumerate((ctypes.c_void_p * len(items)).from_address(address)) if not item
     ]
+
+
+def _problem(begin_s: float, step_s: float, ended_s: float | None) -> tuple[str, str] | None:
+    """Why a step cannot be taken, as key and sentences, or None.
+
+    The last step ended at `ended_s`; None where the host may begin at any time.
+    """
+    if not 0.0 < step_s <= LONGEST_STEP_S:
+        return "size", (
+            f"step size is {step_s} s; expected above 0 and up to {LONGEST_STEP_S:g} s. Step again with such a size."
+        )
+    if not math.isfinite(begin_s):
+        return "begin", f"the step begins at {begin_s} s; expected a finite time. Step again from one."
+    if ended_s is not None and abs(begin_s - ended_s) > GREATEST_JUMP * step_s:
+        return "begin", (
+            f"the step begins at {begin_s} s; expected {ended_s} s, where the last one ended. Step again from there, "
+            "or restore a state or reset the unit before time jumps."
+        )
+    return None
 
 
 class Held(dict[str, Any]):
@@ -163,6 +187,7 @@ class GuardedSlave(Fmi2Slave):
         self._reported: set[str] = set()
         self._ready = self._computed = False
         self._initialising = self._stale = False
+        self._ended_s: float | None = None
         try:
             self.prepare()
         except Exception as error:
@@ -184,7 +209,7 @@ class GuardedSlave(Fmi2Slave):
         """Apply the parameters; ValueError where they cannot be applied."""
 
     def step(self, step_s: float) -> None:
-        """Advance by one communication step [s]."""
+        """Advance by one communication step, above 0 and up to LONGEST_STEP_S [s]."""
         raise NotImplementedError
 
     def shown(self, name: str) -> Value:
@@ -262,13 +287,24 @@ class GuardedSlave(Fmi2Slave):
 
     @guarded(lambda *_: False)
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Take one communication step; returns False (fmi2Discard) where nothing could be computed."""
+        """Take one communication step; returns False (fmi2Discard) where nothing could be computed.
+
+        A step that is refused changes nothing. The first step, and the first after a restored state or a fault, may
+        begin at any time.
+        """
         if not self._ready:
             if self._settable is not self._inputs:  # else the reason is logged already
                 text = f"{self.modelName}: a step was asked for before the initialisation has ended; it is discarded."
                 self.report("not ready", Fmi2Status.error, text)
             return False
+        problem = _problem(current_time, step_size, self._ended_s)
+        if problem:
+            text = f"{self.modelName}: {problem[1]} The step is discarded and no time has passed."
+            self.report(f"step {problem[0]}", Fmi2Status.error, text)
+            return False
+        self._ended_s = None
         self.step(step_size)
+        self._ended_s = current_time + step_size
         return True
 
     @guarded(_nothing)
@@ -327,10 +363,10 @@ class GuardedSlave(Fmi2Slave):
 
     def __init_subclass__(cls) -> None:
         # A text that is not UTF-8 leaves a Python error pending while the wrapper looks up this callback, and only
-        # attributes of the instance's own class are then found.
-        cls.set_string = cls.set_string  # type: ignore[method-assign]
+        # properties of the instance's own class are then found.
+        found = settled(lambda self: partial(GuardedSlave.set_string, self))
+        cls.set_string = property(found)  # type: ignore[method-assign, assignment]
 
-    @settled
     @guarded(_nothing)
     def set_string(self, vrs: list[int], values: list[str | None]) -> None:
         """Set String variables by value reference; a null pointer is the empty text, as is one that is not UTF-8."""
@@ -402,6 +438,7 @@ class GuardedSlave(Fmi2Slave):
         self._settable = self._inputs if content["initialised"] else self._inputs_and_parameters
         self.values = Held(content["values"], self._view)
         self._ready, self._computed = content["ready"], False
+        self._ended_s = None
         self._initialising = self._stale = not content["initialised"]
 
     def _read_state(self, state: bytes) -> tuple[dict[str, Any], tuple[str, str] | None]:

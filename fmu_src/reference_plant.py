@@ -23,9 +23,6 @@ from .interface_plant import MOST_TORQUE_NM, REFERENCE_PLANT, SIDES, WHEELS
 
 File = TypeVar("File", bound=BaseModel)
 
-LONGEST_STEP_S = 10.0
-"""Longest step that is taken: the plant's sub-steps would delay the host for minutes [s]."""
-
 _TORQUES = tuple(f"wheel_torque.{wheel}" for wheel in WHEELS)
 _PER_WHEEL = {
     name: tuple(f"{name}.{wheel}" for wheel in WHEELS)
@@ -73,17 +70,12 @@ class ReferencePlant(GuardedSlave):
             self._warn(
                 "torque", f"{wrong}, expected within +-{MOST_TORQUE_NM:g} N.m. The last good torques act on."
             )
-        if not (math.isfinite(step_s) and 0.0 <= step_s <= LONGEST_STEP_S):
-            self._warn(
-                "step", f"step size is {step_s} s, expected 0 to {LONGEST_STEP_S:g} s. No time has passed."
-            )
-        elif step_s > 0.0:
-            moved = advance(replace(self._state, wheel_torque_nm=self._torque), self._torque, step_s)
-            if _finite(moved):
-                self._state = moved
-                self._publish()
-            else:
-                self._warn("motion", "the motion is no finite number any more. The car stays where it was.")
+        moved = advance(replace(self._state, wheel_torque_nm=self._torque), self._torque, step_s)
+        if _finite(moved):
+            self._state = moved
+            self._publish()
+        else:
+            self._warn("motion", "the motion is no finite number any more. The car stays where it was.")
 
     def _warn(self, kind: str, text: str) -> None:
         self.report(kind, Fmi2Status.warning, f"{self.modelName}: {text}")

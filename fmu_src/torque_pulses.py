@@ -4,16 +4,11 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from pythonfmu.enums import Fmi2Status
-
 from trpac_core.parameters.configuration import check_parameters
 from trpac_core.parameters.variables import Variable
 
 from .guarded_slave import GuardedSlave
 from .interface_pulses import TORQUE_PULSES, WHEELS
-
-LONGEST_STEP_S = 10.0
-"""Longest step that is taken, as in the other units [s]."""
 
 
 class TorquePulses(GuardedSlave):
@@ -27,13 +22,9 @@ class TorquePulses(GuardedSlave):
         self._time_s = 0.0
 
     def step(self, step_s: float) -> None:
-        """Advance the time; a step below 0, above 10 s or not finite is ignored."""
-        if 0.0 <= step_s <= LONGEST_STEP_S:
-            self._time_s += step_s
-            self._publish()
-        else:
-            text = f"step size is {step_s} s, expected 0 to {LONGEST_STEP_S:g} s. No time has passed."
-            self.report("step", Fmi2Status.warning, f"{self.modelName}: {text}")
+        """Advance the time [s]."""
+        self._time_s += step_s
+        self._publish()
 
     def _publish(self) -> None:
         values = self.values

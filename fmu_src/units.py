@@ -26,6 +26,7 @@ CORE_FILES = {
         "trpac_core/parameters/configuration.py",
         "trpac_core/parameters/fields.py",
         "trpac_core/parameters/variables.py",
+        "trpac_core/sensors.py",
     )
 }
 """Files of the core in every unit."""

@@ -52,16 +52,20 @@ def picture_of(
     """A picture as BGR of 8 bits, shape (height, width, 3); raises TrpacError."""
     if isinstance(image, (str, Path)):
         return decode_image(image, upright=upright, bits=bits)
-    array = np.asarray(image)
-    if array.ndim != 3 or array.shape[2] != 3:
+    if not isinstance(image, np.ndarray):
         raise TrpacError(
-            f"image is an array of shape {array.shape}; expected (height, width, 3): repeat a grey one, and leave out "
-            "alpha."
+            f"image is a {type(image).__name__}; expected a path or a numpy array. A picture of PIL is "
+            "np.asarray(image.convert('RGB')) with order='rgb'."
         )
-    array = eight_bits(array, bits=bits)
+    if image.ndim != 3 or image.shape[2] != 3:
+        raise TrpacError(
+            f"image is an array of shape {image.shape}; expected (height, width, 3): repeat a grey one, leave out "
+            "alpha, and move the channels to the end."
+        )
     if order not in ("bgr", "rgb"):
         raise TrpacError(f"order is {order!r}; expected 'bgr' or 'rgb'.")
-    check_size(array.shape[1], array.shape[0], "image")
+    check_size(image.shape[1], image.shape[0], "image")
+    array = eight_bits(image, bits=bits)
     return np.ascontiguousarray(array[..., ::-1] if order == "rgb" else array)
 
 

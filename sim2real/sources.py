@@ -13,8 +13,9 @@ from scipy.ndimage import uniform_filter1d
 
 from scenarios.errors import ScenarioError
 from scenarios.files import RoadFile, VehicleFile, load_road, load_vehicle
-from sim2real.logs import Log, Mapping, load_mapping, read_log, resample
+from sim2real.logs import Log, Mapping, load_mapping, read_log, resample, with_way
 from sim2real.logs.checks import MIN_DURATION_S
+from sim2real.logs.contract import POSITION
 from sim2real.observing.drive import (
     SPEED,
     WHEEL,
@@ -291,6 +292,13 @@ def read_source(text: str, road: Path | None, columns: Mapping | None = None) ->
 
 def make_source(log: Log, road: RoadFile, road_path: Path | None = None) -> Source:
     """A log with its road, made ready; raises ScenarioError where it tells of no driving."""
+    if POSITION not in log.signals and len(road.segments) > 1:
+        raise ScenarioError(
+            f"{log.path}: column {POSITION} is missing; expected the distance from the road's zero, since "
+            f"{road_path or 'the road'} has {len(road.segments)} stretches. Where the log begins at that zero, a "
+            f"mapping file can say `{POSITION}: {{integrate: {{copy: vehicle_speed_m_s}}}}`."
+        )
+    log = with_way(log)
     grid = on_grid(log)
     whole = drive_of(log, road, grid)
     drive = awake(whole)

@@ -21,7 +21,6 @@ EXTRA_OF = {
     "msgpack": "hil",
     "objective_rating_metrics": "gap",
     "padasip": "peers",
-    "pyarrow": "logs",
     "pythonfmu": "fmu",
     "sympy": "design",
 }

@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from trpac_cli import fmu as fmu_commands
-from trpac_cli import gap, vision
+from trpac_cli import gap, log, vision
 from trpac_cli.console import MethodOption, Terminal, UnitOption, bars, kind_to_build, refuse, require_folder
 from trpac_cli.estimate import estimate
 from trpac_cli.hil import hil, hil_plant
@@ -26,6 +26,7 @@ app = typer.Typer(
 )
 app.add_typer(vision.app, name="vision")
 app.add_typer(gap.app, name="gap")
+app.add_typer(log.app, name="log")
 app.add_typer(fmu_commands.app, name="fmu")
 app.command()(estimate)
 app.command()(sweep)

@@ -150,6 +150,7 @@ def load_codec(path: Path = DBC_FILE, signals: Path | None = None) -> Codec:
     shipped_messages = {message.name: message for message in shipped}
     used = {name: _names(shipped_messages[name]) for name in (*INPUT_MESSAGES, *OUTPUT_MESSAGES)}
     ours, notes, counters = frozenset[str](), list[str](), dict[str, str]()
+    invalid: Mapping[str, tuple[float, ...]] = {}
     specs = SHIPPED
     if signals is None:
         _require_shipped(path, messages, shipped_messages)
@@ -160,6 +161,8 @@ def load_codec(path: Path = DBC_FILE, signals: Path | None = None) -> Codec:
         messages, ours, notes = _with_ours(path, messages, shipped_messages)
         specs |= {name: SHIPPED[name] for name in (*LOADS, *TRUTH) if _has(messages, SHIPPED[name].column)}
         _require_counted(signals, path, messages, counters)
+        _require_known(signals, path, messages, stated.invalid)
+        invalid = stated.invalid
     _require_units(path, messages, shipped_messages)
     resolver = Resolver(messages, quoted(path), quoted(signals) if signals else "", specs)
     roles = {name: resolver.role(name) for name in specs}
@@ -175,7 +178,8 @@ def load_codec(path: Path = DBC_FILE, signals: Path | None = None) -> Codec:
         message = messages[name]
         try:
             _require_single(message, theirs)
-            coded[name] = _tried(message, names, counters.get(name, ""))
+            none = {s: _none_of(f"{name}.{s}", invalid) for s in names} if name not in ours else {}
+            coded[name] = _tried(message, names, counters.get(name, ""), none)
         except DAMAGE as error:
             like = f" Expected one like that of {DBC_FILE}." if name in shipped_messages else ""
             raise HilError(f"{quoted(path)}: {name} cannot be used ({quoted(error)}).{like}") from error
@@ -278,6 +282,25 @@ def _require_counted(
             )
 
 
+def _none_of(column: str, invalid: Mapping[str, tuple[float, ...]]) -> tuple[float, ...]:
+    """Values of a signal that a mapping names as invalid: by `Message.Signal`, by `Signal`, or for all columns."""
+    plain = {name.partition("#")[0]: values for name, values in invalid.items()}
+    return tuple(v for name in (column, column.partition(".")[2], "*") for v in plain.get(name, ()))
+
+
+def _require_known(
+    signals: Path, path: Path, messages: Mapping[str, Message], invalid: Mapping[str, tuple[float, ...]]
+) -> None:
+    """Raise HilError where a mapping names invalid values of a signal that the DBC file does not have."""
+    known = {s.name for m in messages.values() for s in m.signals} | {"*"}
+    for name in (name.partition("#")[0] for name in invalid):
+        if name not in known and not _has(messages, name):
+            raise HilError(
+                f"{quoted(signals)}: invalid: {quoted(path)} has no signal {quoted(name)}. Expected Message.Signal, or "
+                '"*" for all.'
+            )
+
+
 def _require_single(message: Message, all_messages: Iterable[Message]) -> None:
     """Raise ValueError where a message's name or identifier is there twice."""
     key = (message.frame_id, message.is_extended_frame)
@@ -287,12 +310,14 @@ def _require_single(message: Message, all_messages: Iterable[Message]) -> None:
         raise ValueError(f"its name or its identifier is there twice: {others}")
 
 
-def _tried(message: Message, used: Collection[str], counter: str) -> Coded:
+def _tried(
+    message: Message, used: Collection[str], counter: str, invalid: Mapping[str, Collection[float]]
+) -> Coded:
     """The coding of a message after test values were encoded and decoded; raises one of `DAMAGE`."""
     longest = CLASSIC_BYTES if message.name in OUTPUT_MESSAGES else FD_SIZES[-1]
     if message.length > longest:
         raise ValueError(f"it has {message.length} bytes; expected at most {longest}")
-    coded = Coded.of(message, used, counter)
+    coded = Coded.of(message, used, counter, invalid)
     if coded.selections and message.name in (*OUTPUT_MESSAGES, CLASS_MESSAGE):
         raise ValueError("it is multiplexed")
     coded.try_out()

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from trpac_core.sensors import LONGEST_STEP_S
 from trpac_hil.bus import Link
 from trpac_hil.camera_input import CameraInput
 from trpac_hil.codec import CLASS_MESSAGE, Codec
@@ -143,7 +144,8 @@ class Loop:
             self._unit.give_class(camera_input.classes, camera_input.number)
         readings = self._readings(values)
         unit_began_ns = self._clock.now_ns()
-        step_s = (slot - self._unit_slot) * self._deadlines.period_ns * 1e-9
+        # The unit discards longer steps: after a longer halt its time falls behind the wall's.
+        step_s = min((slot - self._unit_slot) * self._deadlines.period_ns * 1e-9, LONGEST_STEP_S)
         estimates = self._unit.step(self._unit_time_s, step_s, self._references, readings)
         unit_ended_ns = self._clock.now_ns()
         status = self._judge(estimates, readings, bool(doubted))

@@ -6,6 +6,7 @@ import math
 import struct
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from cantools.database.can import Message, Signal
 
@@ -32,6 +33,7 @@ FLOATS = {16: ("<e", 65504.0), 32: ("<f", 3.4028234e38), 64: ("<d", 1.7976931348
 """Format and greatest number of a float of so many bits; IEEE 754."""
 TRIED = (math.nan, -math.inf, 0.0, 1.0, math.inf)
 """Values that each message must be able to carry, or to cut to its range, before the loop begins."""
+NOTHING: Mapping[str, Collection[float]] = MappingProxyType({})
 Selection = tuple[tuple[str, int], ...]
 """Raw values of the multiplexers that select a signal, from the outermost on; empty for one that is always there."""
 
@@ -72,8 +74,11 @@ class Field:
     selectors: tuple[tuple[str, frozenset[int]], ...]
 
     @classmethod
-    def of(cls, signal: Signal, message: Message) -> Field:
-        """The place of a signal; raises ValueError where it is not in the message or cannot be computed."""
+    def of(cls, signal: Signal, message: Message, invalid: Collection[float] = ()) -> Field:
+        """The place of a signal; raises ValueError where it is not in the message or cannot be computed.
+
+        `invalid` are values that say that there is none, besides those of the file.
+        """
         bits = signal.length
         little = signal.byte_order == "little_endian"
         first = signal.start if little else 8 * (signal.start // 8) + 7 - signal.start % 8
@@ -97,7 +102,7 @@ class Field:
             offset=offset,
             low=low - half,
             high=high + half,
-            invalid=_invalid(signal),
+            invalid=_invalid(signal) | {raw for v in invalid if _holds(signal, raw := _raw_of(v, signal))},
             selectors=_selectors(signal, message),
         )
 
@@ -163,11 +168,18 @@ class Coded:
     selections: Mapping[str, Selection]
 
     @classmethod
-    def of(cls, message: Message, used: Collection[str], counter: str = "") -> Coded:
+    def of(
+        cls,
+        message: Message,
+        used: Collection[str],
+        counter: str = "",
+        invalid: Mapping[str, Collection[float]] = NOTHING,
+    ) -> Coded:
         """The coding of a message of a DBC file; raises one of `sim2real.logs.dbc.DAMAGE`.
 
         `used` are the signals to read or write, `counter` is the one that counts the messages: `NO_COUNTER` for none,
-        empty for the one that is called so.
+        empty for the one that is called so. `invalid` are values of signals that say that there is none, besides those
+        that the file names.
         """
         by_name = {signal.name: signal for signal in message.signals}
         if len(by_name) < len(message.signals):
@@ -175,7 +187,10 @@ class Coded:
         counting = _counter(by_name, counter)
         signals = tuple(name for name in by_name if name in used and name != counting)
         cycle_ns = _whole_ms(message.cycle_time, "its cycle time") if message.cycle_time else 0
-        fields = {name: Field.of(by_name[name], message) for name in (*signals, *filter(None, [counting]))}
+        fields = {
+            name: Field.of(by_name[name], message, invalid.get(name, ()))
+            for name in (*signals, *filter(None, [counting]))
+        }
         multiplexers = {name for field in fields.values() for name, _ in field.selectors}
         fields |= {name: Field.of(by_name[name], message) for name in sorted(multiplexers - set(fields))}
         selections = {
@@ -191,7 +206,7 @@ class Coded:
             signals,
             counting,
             _counts(by_name[counting]) if counting else 0,
-            {name: _absent(by_name[name]) for name in signals if fields[name].invalid},
+            {name: _absent(by_name[name], fields[name].invalid) for name in signals if fields[name].invalid},
             {name: _bounds(by_name[name], fields[name].invalid) for name in signals},
             {
                 name: _stale_ns(by_name[name], cycle_ns * (pages if name in selections else 1))
@@ -290,8 +305,7 @@ def _invalid(signal: Signal) -> frozenset[float]:
     values = 2**signal.length
     # Some tools write the codes of signed signals as if they had no sign.
     raws = {raw - values if signal.is_signed and values / 2 <= raw < values else raw for raw in invalid}
-    low, high = (-values // 2, values // 2 - 1) if signal.is_signed else (0, values - 1)
-    if not all(low <= raw <= high for raw in raws):
+    if not all(_holds(signal, raw) for raw in raws):
         raise ValueError(f"{signal.name} has a value in its table that its bits do not hold")
     return frozenset(raws)
 
@@ -357,11 +371,24 @@ def _stale_ns(signal: Signal, cycle_ns: int) -> int:
     return max(STALE_CYCLES * cycle_ns, LEAST_STALE_NS) if cycle_ns else STALE_WITHOUT_CYCLE_NS
 
 
-def _absent(signal: Signal) -> float:
+def _holds(signal: Signal, raw: float) -> bool:
+    """Whether a raw value is one that the signal's bits can have."""
+    values = 2**signal.length
+    low, high = (-values // 2, values // 2 - 1) if signal.is_signed else (0, values - 1)
+    return bool(signal.is_float or low <= raw <= high)
+
+
+def _raw_of(value: float, signal: Signal) -> float:
+    """Raw value of a value in the signal's unit."""
+    raw = (value - float(signal.offset)) / float(signal.scale)
+    return raw if signal.is_float else float(round(raw))
+
+
+def _absent(signal: Signal, invalid: Collection[float]) -> float:
     """Physical value of the raw value that says best that there is none."""
     named = [raw for raw, name in (signal.choices or {}).items() if str(name) == NOT_AVAILABLE]
-    raw = named[0] if named else max(_invalid(signal))
-    return float(raw * signal.scale + signal.offset)
+    raw = named[0] if named else max(invalid)
+    return float(raw) * float(signal.scale) + float(signal.offset)
 
 
 def _stated(signal: Signal) -> tuple[float, float]:

@@ -34,6 +34,7 @@ from trpac_core.vehicle import WHEELS
 
 from ..contents import CONTENTS_FILE, Contents, sha256_of
 from ..estimate_outputs import FIELDS
+from ..guarded_slave import GREATEST_JUMP
 from ..interface import TRPAC_ESTIMATOR
 from ..interface_4w import TRPAC_ESTIMATOR_4W
 from ..model_description import TIME, UnitInfo, build_description, model_description, model_description_3
@@ -158,6 +159,7 @@ def sources(unit: UnitInfo, guid: str, fmi: int = 2) -> dict[str, str]:
     constants = {
         "NO_ROAD_CLASS": str(NO_ROAD_CLASS),
         "LONGEST_STEP": repr(LONGEST_STEP_S),
+        "GREATEST_JUMP": repr(GREATEST_JUMP),
         "INITIAL_SLOPE_OF_THE_TYRE": repr(INITIAL_SLOPE),
         **{f"MOST_{name}": repr(most) for name, most in PLAUSIBLE.items()},
     }

@@ -6,6 +6,7 @@ from sim2real.logs.log import Log
 from sim2real.logs.mapping import Mapping, load_mapping
 from sim2real.logs.read import log_of_frame, read_log
 from sim2real.logs.resampling import resample
+from sim2real.logs.way import with_way
 from sim2real.logs.write import write_log
 
 __all__ = [
@@ -19,5 +20,6 @@ __all__ = [
     "log_of_frame",
     "read_log",
     "resample",
+    "with_way",
     "write_log",
 ]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim2real.logs.contract import REQUIRED, TIME, WHEEL_SPEEDS
+from sim2real.logs.contract import POSITION, REQUIRED, TIME
 from sim2real.logs.resampling import BROKEN, lost_share, median_step
 from sim2real.logs.table import SHOWN, Array, Finding, and_more
 from sim2real.logs.units import factor
@@ -32,21 +32,6 @@ LOST_SHARE = 0.5
 LOST_WARNING = 0.05
 """Share of lost samples worth a warning."""
 
-MOVING_M_S = 3.0
-"""From this speed on a wheel speed is compared with it [m/s]."""
-WHEEL_PER_METRE = (1.5, 6.5)
-"""Wheel speed over ground speed, radius 0.15 to 0.67 m [rad/m]; with km/h, with rpm and with both it lies outside."""
-ROLLING_SHARE = 0.1
-"""Least share of the rows in which a wheel turns so: it may be locked or spin in the others [-]."""
-DISTANCE_M = 10.0
-"""From this distance on the position is compared with the integral of speed [m]."""
-DISTANCE_RATIO = (0.5, 2.0)
-"""Change of position over the integral of speed; kilometres, feet and km/h lie outside."""
-SMOOTH_S = 0.5
-"""The accelerometer is compared with the change of speed over pieces of this length [s]."""
-VARIED_M_S2 = 0.5
-"""Least standard deviation of the change of speed for that comparison [m/s2]."""
-
 FEWEST_STEPS = 50
 """Changes of value from which on a signal may be called held."""
 EARLY_SHARE = 0.02
@@ -69,24 +54,13 @@ class Clock:
 
 
 def check_time(time_s: Array, row: Row) -> Clock:
-    """Whether time ascends at a usable rate; the gaps in it."""
-    bad = np.flatnonzero(~np.isfinite(time_s))
-    if len(bad):
-        return _unusable(f"column {TIME}: {rows_text(bad, row)} has no time; expected one in every row.")
+    """Whether ascending times come at a usable rate; the gaps in them."""
     step = np.diff(time_s)
-    back = np.flatnonzero(step <= 0.0) + 1
-    if len(back):
-        i = int(back[0])
-        what = "repeats" if step[i - 1] == 0.0 else "lies before"
-        return _unusable(
-            f"column {TIME}: {rows_text(back, row)} {what} the time above ({time_s[i]:.9g} after {time_s[i - 1]:.9g}); "
-            "expected ascending times, written with enough digits."
-        )
     duration = float(time_s[-1] - time_s[0]) if len(time_s) else 0.0
     rate = 1.0 / median_step(time_s) if len(step) else RATE_HZ[0]
     if not RATE_HZ[0] / (1.0 + RATE_TOLERANCE) <= rate <= RATE_HZ[1] * (1.0 + RATE_TOLERANCE):
         return _unusable(
-            f"comes at {rate:.4g} Hz; expected {_span(CONTRACT_RATE_HZ)} Hz.{_time_unit_hint(rate)}"
+            f"comes at {rate:.4g} Hz; expected {span(CONTRACT_RATE_HZ)} Hz.{_time_unit_hint(rate)}"
         )
     if duration < MIN_DURATION_S:
         return _unusable(f"is {duration:.3g} s long; expected at least {MIN_DURATION_S:g} s.")
@@ -140,7 +114,7 @@ def check_values(time_s: Array | None, signals: Mapping[str, Array], row: Row) -
             yield Finding(f"column {name} has no value at all; {tail}", fatal=name in REQUIRED)
             continue
         share = share if time_s is None else lost_share(values, median_step(time_s))
-        if name in REQUIRED and share > LOST_WARNING:
+        if name in (*REQUIRED, POSITION) and share > LOST_WARNING:
             fatal = share > LOST_SHARE
             tail = f"; expected at most {LOST_SHARE:.0%}." if fatal else "."
             yield Finding(f"column {name}: {share:.0%} of its samples are lost{tail}", fatal)
@@ -151,81 +125,6 @@ def check_values(time_s: Array | None, signals: Mapping[str, Array], row: Row) -
     yield from _check_range(
         signals, "mu_reference", lambda x: (x >= 0) & (x <= 2), "0 to 2 (unit: '%'?)", row
     )
-
-
-def check_motion(time_s: Array, signals: Mapping[str, Array]) -> Iterator[Finding]:
-    """Whether position, speed and acceleration agree to a factor: units, signs."""
-    if "vehicle_speed_m_s" not in signals:
-        return
-    speed = signals["vehicle_speed_m_s"]
-    if "position_m" in signals:
-        yield from _check_position(time_s, speed, signals["position_m"])
-    if "accel_x_m_s2" in signals:
-        yield from _check_acceleration(time_s, speed, signals["accel_x_m_s2"])
-
-
-def check_wheels(signals: Mapping[str, Array]) -> Iterator[Finding]:
-    """Whether the wheels turn about as fast as the car moves: units, signs; said once where all are off alike."""
-    off = {}
-    for name in (n for n in WHEEL_SPEEDS if n in signals and "vehicle_speed_m_s" in signals):
-        speed = signals["vehicle_speed_m_s"]
-        moving = (np.abs(speed) > MOVING_M_S) & np.isfinite(speed + signals[name])
-        if np.count_nonzero(moving) < 2:
-            continue
-        per_metre = signals[name][moving] / speed[moving]
-        rolling = (per_metre >= WHEEL_PER_METRE[0]) & (per_metre <= WHEEL_PER_METRE[1])
-        if np.mean(rolling) < ROLLING_SHARE:
-            off[name] = float(np.median(per_metre))
-    if len(off) == len(WHEEL_SPEEDS) and len({_ratio_hint(ratio) for ratio in off.values()}) == 1:
-        yield _wheel_finding("every wheel speed", float(np.median(list(off.values()))))
-        return
-    for name, ratio in off.items():
-        yield _wheel_finding(f"column {name}", ratio)
-
-
-def _wheel_finding(what: str, ratio: float) -> Finding:
-    return Finding(
-        f"{what} over vehicle_speed_m_s is {ratio:.3g} rad/m in the median; expected {_span(WHEEL_PER_METRE)} rad/m "
-        f"(one over the wheel's radius). {_ratio_hint(ratio)}"
-    )
-
-
-def _check_position(time_s: Array, speed: Array, position: Array) -> Iterator[Finding]:
-    known = np.isfinite(speed) & np.isfinite(position)
-    if np.count_nonzero(known) < 2:
-        return
-    driven = float(np.trapezoid(speed[known], time_s[known]))
-    moved = float(position[known][-1] - position[known][0])
-    if driven > DISTANCE_M and not DISTANCE_RATIO[0] <= moved / driven <= DISTANCE_RATIO[1]:
-        yield Finding(
-            f"column position_m changes by {moved:.4g} m while the speed integrates to {driven:.4g} m; expected the "
-            "distance driven along the road in metres, without a reset. Where it was not measured, a mapping file "
-            "can say `position_m: {integrate: {copy: vehicle_speed_m_s}}`."
-        )
-
-
-def _check_acceleration(time_s: Array, speed: Array, accel: Array) -> Iterator[Finding]:
-    """Slope of the accelerometer over the change of speed; only a warning, since grade and bias blur it."""
-    known = np.isfinite(speed) & np.isfinite(accel)
-    t, v, a = time_s[known], speed[known], accel[known]
-    if np.count_nonzero(known) < 2:
-        return
-    piece = np.floor((t - t[0]) / SMOOTH_S).astype(int)
-    _, first = np.unique(piece, return_index=True)
-    change = np.diff(v[first]) / np.diff(t[first])
-    mean = (np.add.reduceat(a, first) / np.diff([*first, len(a)]))[:-1]
-    if len(change) < 3 or np.std(change) < VARIED_M_S2:
-        return
-    slope = float(np.cov(change, mean)[0, 1] / np.var(change, ddof=1))
-    if slope < -0.5:
-        yield Finding(
-            "accel_x_m_s2 goes against the change of vehicle_speed_m_s; is its sign reversed?", fatal=False
-        )
-    elif abs(slope) < 0.25:
-        hint = "is it in g?" if slope > 0.05 else "is it the longitudinal acceleration, and in m/s2?"
-        yield Finding(
-            f"accel_x_m_s2 is {slope:.2g} times the change of vehicle_speed_m_s; {hint}", fatal=False
-        )
 
 
 def check_held(time_s: Array, signals: Mapping[str, Array]) -> Iterator[Finding]:
@@ -284,19 +183,6 @@ def _time_unit_hint(rate: float) -> str:
     return ""
 
 
-def _ratio_hint(ratio: float) -> str:
-    if ratio < 0.0:
-        return "Is a sign reversed?"
-    if ratio < WHEEL_PER_METRE[0]:
-        return (
-            "Is the vehicle's speed in km/h, or the wheel's in m/s or rev/s? A mapping file says so: "
-            "`vehicle_speed_m_s: {column: NAME, unit: km/h}`."
-        )
-    return (
-        "Is the wheel's speed in rpm, deg/s or km/h? A mapping file says so: "
-        "`wheel_speed_fl_rad_s: {column: NAME, unit: rpm}`."
-    )
-
-
-def _span(bounds: tuple[float, float]) -> str:
+def span(bounds: tuple[float, float]) -> str:
+    """Two bounds as text."""
     return f"{bounds[0]:g} to {bounds[1]:g}"

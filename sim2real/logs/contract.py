@@ -28,7 +28,7 @@ class Column:
     held: bool = False
 
 
-TIME = "time_s"
+TIME, POSITION = "time_s", "position_m"
 IMAGE_PATH = "image_path"
 """The only column that holds text; relative to the log's folder."""
 
@@ -38,7 +38,7 @@ _ALL = (
     *(Column(f"wheel_speed_{w}_rad_s", "rad/s", "wheel speed", True) for w in WHEELS),
     Column("vehicle_speed_m_s", "m/s", "speed over ground", True),
     Column("accel_x_m_s2", "m/s2", "longitudinal acceleration as the accelerometer reads it", True),
-    Column("position_m", "m", "distance of the centre of gravity from the road's zero", True),
+    Column(POSITION, "m", "distance of the centre of gravity from the road's zero"),
     Column("steering_angle_rad", "rad", "steering angle at the wheels"),
     Column("yaw_rate_rad_s", "rad/s", "yaw rate"),
     Column("accel_y_m_s2", "m/s2", "lateral acceleration"),

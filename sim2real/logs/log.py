@@ -42,6 +42,8 @@ class Log:
         What is odd about it, in sentences.
     sha256 : str
         Of the file.
+    notes : tuple of str
+        How the file was understood, each in a few words.
     """
 
     path: Path
@@ -55,6 +57,7 @@ class Log:
     ignored: tuple[str, ...]
     warnings: tuple[str, ...]
     sha256: str
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,8 +13,11 @@ from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 from scenarios.strict import load_strict
 from sim2real.logs.contract import COLUMNS, IMAGE_PATH, TIME
 from sim2real.logs.errors import LogError
+from sim2real.logs.times import FORMS, SECONDS
 from sim2real.logs.units import factor
 
+BLANKS = "blanks"
+"""The separator of columns that any number of blanks stands between."""
 SOURCES = ("column", "constant", "sum", "integrate", "copy")
 INTEGRAND_UNIT = {"m": "m/s", "m/s": "m/s2", "rad": "rad/s"}
 """Unit of a column of the log format, and of what it is the integral of."""
@@ -98,6 +102,55 @@ class Spec(_Strict):
             yield from term.leaves()
 
 
+class Format(_Strict):
+    """How a text table is written; rows count as in an editor. What is not stated is found out.
+
+    `separator` is one character, or "blanks" for any number of them; `unit_row` 0 says that there is none.
+    """
+
+    encoding: Annotated[str, Field(max_length=40)] | None = None
+    separator: Annotated[str, Field(min_length=1, max_length=6)] | None = None
+    decimal: Literal[".", ","] | None = None
+    header_row: int | None = Field(default=None, ge=1, le=10_000)
+    unit_row: int | None = Field(default=None, ge=0, le=10_000)
+
+    @model_validator(mode="after")
+    def _check(self) -> Format:
+        problems = []
+        if self.encoding is not None and not _is_encoding(self.encoding):
+            problems.append(
+                f"encoding: {self.encoding!r} is not known; expected a name such as utf-8, utf-16 or cp1252."
+            )
+        if self.separator is not None and len(self.separator) > 1 and self.separator != BLANKS:
+            problems.append(f"separator: {self.separator!r}; expected one character, or {BLANKS}.")
+        if self.unit_row and self.unit_row <= (self.header_row or 0):
+            problems.append("unit_row: expected a row below header_row, or 0 for none.")
+        if problems:
+            raise ValueError("\n".join(problems))
+        return self
+
+
+class TimeSource(_Strict):
+    """The column of time, its form (see `times.FORMS`, or a strptime pattern), and its unit where it is a number."""
+
+    column: Name
+    form: Annotated[str, Field(max_length=100)] = SECONDS
+    unit: Name | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> TimeSource:
+        if self.form not in FORMS and "%" not in self.form:
+            raise ValueError(
+                f"form: {self.form!r}; expected {', '.join(FORMS)}, or a pattern of strptime such as "
+                "'%d.%m.%Y %H:%M:%S.%f'."
+            )
+        if self.unit is not None and self.form != SECONDS:
+            raise ValueError(f"unit: belongs to form {SECONDS}; expected none beside {self.form}.")
+        if self.unit is not None:
+            factor(self.unit, "s")
+        return self
+
+
 @dataclass(frozen=True)
 class Mapping:
     """How a tool's columns become those of the log format; what is not in it is read under its own name.
@@ -108,12 +161,21 @@ class Mapping:
         Its file.
     columns : dict
         Column of the log format to its source.
+    format : Format
+        How a text table is written.
+    time_form : str
+        Form of the time column; empty where it is to be found out.
+    invalid : dict
+        Values that say "no value", by column of the file; "*" is every column.
     counters : dict
         Message of a bus to the signal that counts it; no column, and of use on a live bus alone.
     """
 
     path: Path
     columns: dict[str, Spec]
+    format: Format = field(default_factory=Format)
+    time_form: str = ""
+    invalid: dict[str, tuple[float, ...]] = field(default_factory=dict)
     counters: dict[str, str] = field(default_factory=dict)
 
     def spec(self, column: str) -> Spec:
@@ -137,7 +199,7 @@ class _MappingBase(_Strict):
         if isinstance(data, dict) and "columns" in data:
             columns = data["columns"]
             rest = {key: value for key, value in data.items() if key != "columns"}
-            both = sorted(str(key) for key in set(rest) - {"schema", "counters"})
+            both = sorted(str(key) for key in set(rest) - {"schema", "format", "time", "invalid", "counters"})
             if not isinstance(columns, dict) or both:
                 raise ValueError(
                     f"columns: stands beside {', '.join(both)}; expected all columns in one place."
@@ -151,7 +213,9 @@ class _MappingBase(_Strict):
     def _check(self) -> _MappingBase:
         specs = specs_of(self)
         problems = [text for name, spec in specs.items() for text in _problems(name, spec, specs)]
-        if not specs:
+        if self.time is not None and TIME in specs:  # type: ignore[attr-defined]
+            problems.append(f"time: stands beside {TIME}; expected one of them.")
+        if self.model_fields_set <= {"schema_"}:
             problems.append(
                 "maps nothing; expected lines such as vehicle_speed_m_s: {column: VehSpd, unit: km/h}."
             )
@@ -164,6 +228,9 @@ MappingFile = create_model(
     "MappingFile",
     __base__=_MappingBase,
     schema_=(Literal[1], Field(default=1, alias="schema")),
+    format=(Format, Field(default_factory=Format)),
+    time=(TimeSource | None, Field(default=None)),
+    invalid=(dict[Name, Annotated[list[Factor], Field(max_length=100)]], Field(default_factory=dict)),
     counters=(dict[Name, Name], Field(default_factory=dict, max_length=1_000)),
     **{name: (Spec, Field(default=None)) for name in COLUMNS},  # type: ignore[call-overload]
 )
@@ -177,12 +244,30 @@ def load_mapping(path: str | Path) -> Mapping:
         raise
     except ValueError as error:
         raise LogError(str(error)) from error
-    return Mapping(Path(path), specs_of(file), file.counters)
+    return mapping_of(file, Path(path))
+
+
+def mapping_of(file: BaseModel, path: Path) -> Mapping:
+    """The mapping that a `MappingFile` says; `path` is what messages call it."""
+    specs = specs_of(file)
+    time: TimeSource | None = getattr(file, "time")  # noqa: B009 - the model is made from `COLUMNS`
+    if time is not None:
+        specs[TIME] = Spec(column=time.column, unit=time.unit)
+    invalid = {name: tuple(values) for name, values in getattr(file, "invalid").items()}  # noqa: B009
+    counters: dict[str, str] = getattr(file, "counters")  # noqa: B009
+    return Mapping(path, specs, getattr(file, "format"), time.form if time else "", invalid, counters)  # noqa: B009
 
 
 def specs_of(file: BaseModel) -> dict[str, Spec]:
     """Column of the log format to its source, of a `MappingFile`."""
     return {name: getattr(file, name) for name in COLUMNS if name in file.model_fields_set}
+
+
+def _is_encoding(name: str) -> bool:
+    try:
+        return codecs.lookup(name)._is_text_encoding
+    except (LookupError, ValueError):
+        return False
 
 
 def _problems(name: str, spec: Spec, specs: dict[str, Spec]) -> list[str]:

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from sim2real.logs.checks import check_held, check_motion, check_time, check_values, check_wheels
+from sim2real.logs.agreement import check_agreement, check_wheels
+from sim2real.logs.checks import Clock, check_held, check_time, check_values
 from sim2real.logs.csv_file import read_csv
 from sim2real.logs.errors import LogError
 from sim2real.logs.frame_table import frame_sha256, frame_table
 from sim2real.logs.log import Log
 from sim2real.logs.mapping import NO_MAPPING, Mapping
 from sim2real.logs.mdf_file import read_mdf
+from sim2real.logs.parquet_file import read_parquet
+from sim2real.logs.plausible import lost_samples, without_codes, without_stuck_codes
 from sim2real.logs.resampling import median_step
-from sim2real.logs.table import Finding, Table, Wanted
+from sim2real.logs.rows import in_order, one_per_message
+from sim2real.logs.table import Array, Finding, Table
 from sim2real.logs.translate import (
     ignored_columns,
     missing_columns,
@@ -36,7 +41,9 @@ MAGIC = {b"PAR1": "Parquet", b"MDF ": "MDF", b"UnFi": "MDF"}
 SUFFIXES = {".csv": "CSV", ".parquet": "Parquet", ".mf4": "MDF", ".mdf": "MDF", ".dat": "MDF"}
 
 
-def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
+def read_log(
+    path: str | Path, mapping: Mapping | None = None, *, progress: Callable[[int], None] = lambda _: None
+) -> Log:
     """Read a log strictly: CSV, Parquet or MDF, told apart by their content.
 
     Parameters
@@ -45,20 +52,36 @@ def read_log(path: str | Path, mapping: Mapping | None = None) -> Log:
         The file.
     mapping : Mapping, optional
         How its columns become those of the log format; columns that it does not name are read under their own names.
+    progress : callable
+        Called with the bytes of a text table that were read so far.
 
     Raises
     ------
     LogError
         With all problems of the file, one a line.
     """
+    path = Path(path)
+    return understood(path, mapping, progress=progress).log(lambda: file_sha256(path))
+
+
+def understood(
+    path: str | Path, mapping: Mapping | None = None, *, progress: Callable[[int], None] = lambda _: None
+) -> Understood:
+    """What a file is understood to hold, usable or not; parameters as of `read_log`.
+
+    Raises
+    ------
+    LogError
+        It cannot be read at all.
+    """
     path, mapping = Path(path), mapping or NO_MAPPING
     try:
-        row_word, table = _read_table(path, wanted_columns(mapping))
+        row_word, table = _read_table(path, mapping, progress)
     except LogError:
         raise
     except (FileError, ValueError) as error:  # the latter of text that is no picture's path
         raise LogError(f"{quoted(path)}: {error}" if type(error) is ValueError else str(error)) from error
-    return _log(table, mapping, path, row_word, lambda: file_sha256(path))
+    return _understand(table, mapping, path, row_word)
 
 
 def log_of_frame(frame: pd.DataFrame, mapping: Mapping | None = None, name: str = "frame") -> Log:
@@ -80,48 +103,105 @@ def log_of_frame(frame: pd.DataFrame, mapping: Mapping | None = None, name: str 
     """
     mapping = mapping or NO_MAPPING
     table = frame_table(frame, wanted_columns(mapping))
-    return _log(table, mapping, Path(name), "row", lambda: frame_sha256(frame))
+    return _understand(table, mapping, Path(name), "row").log(lambda: frame_sha256(frame))
 
 
-def _log(table: Table, mapping: Mapping, path: Path, row_word: str, sha256: Callable[[], str]) -> Log:
-    """The log that a table makes under a mapping; raises LogError with all problems."""
+@dataclass(frozen=True)
+class Understood:
+    """A table under a mapping, with all that is odd about it.
 
+    Attributes
+    ----------
+    path : Path
+        Its file.
+    mapping : Mapping
+        How its columns become those of the log format.
+    table : Table
+        The file's columns, in the rows that are kept.
+    time_s : array, shape (n,)
+        Ascending [s]; empty where the file has no time.
+    signals : dict
+        The columns of the log format that could be made, shape (n,).
+    derived : frozenset of str
+        Those of them that were computed rather than measured.
+    gaps : tuple of (float, float)
+        Pieces of time without rows [s].
+    findings : tuple of Finding
+        What is odd; a fatal one keeps it from being a log.
+    """
+
+    path: Path
+    mapping: Mapping
+    table: Table
+    time_s: Array
+    signals: dict[str, Array]
+    derived: frozenset[str]
+    gaps: tuple[tuple[float, float], ...]
+    findings: tuple[Finding, ...]
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What keeps it from being a log, in sentences."""
+        return tuple(quoted(finding.text, LONGEST_FINDING) for finding in self.findings if finding.fatal)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What else is odd, in sentences."""
+        return tuple(quoted(finding.text, LONGEST_FINDING) for finding in self.findings if not finding.fatal)
+
+    def log(self, sha256: Callable[[], str]) -> Log:
+        """The log, with what `sha256` returns; raises LogError with all problems."""
+        if self.problems:
+            raise LogError("\n".join(f"{quoted(self.path)}: {text}" for text in self.problems))
+        return Log(
+            path=self.path,
+            name=self.path.name,
+            time_s=self.time_s,
+            signals={name: values for name, values in self.signals.items() if not np.isnan(values).all()},
+            image_path=self.table.text.get(picture_source(self.mapping)),
+            rate_hz=1.0 / median_step(self.time_s),
+            gaps=self.gaps,
+            derived=self.derived,
+            ignored=ignored_columns(self.table, self.mapping),
+            warnings=self.warnings,
+            sha256=sha256(),
+            notes=self.table.notes,
+        )
+
+
+def _understand(table: Table, mapping: Mapping, path: Path, row_word: str) -> Understood:
     def row(i: int) -> str:
         return f"{row_word} {table.rows[i]}"
 
+    wanted = wanted_columns(mapping)
+    table = without_codes(table, mapping.invalid)
+    table = without_stuck_codes(table, wanted.numbers - wanted.held - {wanted.time})
+    time_s, table = read_time(table, mapping)
     findings = [*table.findings, *missing_columns(table, mapping)]
-    time_s = read_time(table, mapping)
     if time_s is None or len(time_s) == 0:
-        raise _error(path, findings)
-    clock = check_time(time_s, row)
-    made = translate(table, mapping, time_s if clock.usable else None)
-    findings += [
-        *clock.findings,
-        *made.findings,
-        *check_values(time_s if clock.usable else None, made.signals, row),
-        *check_wheels(made.signals),
-    ]
-    if clock.usable:
-        findings += [*check_motion(time_s, made.signals), *check_held(time_s, made.signals)]
-    if any(finding.fatal for finding in findings):
-        raise _error(path, findings)
-    return Log(
-        path=path,
-        name=path.name,
-        time_s=time_s,
-        signals={name: values for name, values in made.signals.items() if not np.isnan(values).all()},
-        image_path=table.text.get(picture_source(mapping)),
-        rate_hz=1.0 / median_step(time_s),
-        gaps=clock.gaps,
-        derived=made.derived,
-        ignored=ignored_columns(table, mapping),
-        warnings=tuple(quoted(finding.text, LONGEST_FINDING) for finding in findings),
-        sha256=sha256(),
-    )
+        if not any(finding.fatal for finding in findings):
+            findings.append(Finding("has no rows; expected one row per sample."))
+        made = translate(table, mapping, None)
+        return Understood(path, mapping, table, np.zeros(0), made.signals, made.derived, (), tuple(findings))
+    if wanted.time and (apart := one_per_message(path, table, time_s, wanted)) is not None:
+        table, time_s = apart, apart.numbers[wanted.time]
+        findings = [*table.findings, *missing_columns(table, mapping)]
+    kept, said = in_order(time_s, row)
+    table, time_s = table.kept(kept), time_s[kept]
+    clock = Clock() if any(finding.fatal for finding in said) else check_time(time_s, row)
+    usable = clock.usable and kept.any() and not any(finding.fatal for finding in said)
+    made = translate(table, mapping, time_s if usable else None)
+    signals, lost = lost_samples(time_s, made.signals) if usable else (made.signals, [])
+    findings += [*said, *clock.findings, *made.findings, *lost]
+    findings += [*check_values(time_s if usable else None, signals, row), *check_wheels(signals)]
+    if usable:
+        findings += [*check_agreement(time_s, signals, made.derived), *check_held(time_s, signals)]
+    return Understood(path, mapping, table, time_s, signals, made.derived, clock.gaps, tuple(findings))
 
 
-def _read_table(path: Path, wanted: Wanted) -> tuple[str, Table]:
+def _read_table(path: Path, mapping: Mapping, progress: Callable[[int], None]) -> tuple[str, Table]:
     """The file's columns, and what one of its rows is called; the content tells the format, the name must agree."""
+    wanted = wanted_columns(mapping)
     with open_file(path, MOST_BYTES, "a log") as file:
         start = file.read(4)
     kind = MAGIC.get(start, "CSV")
@@ -131,14 +211,7 @@ def _read_table(path: Path, wanted: Wanted) -> tuple[str, Table]:
             f"{path}: is named like {named} and does not start like it; expected a whole {named} file."
         )
     if kind == "Parquet":
-        from sim2real.logs.parquet_file import read_parquet  # pyarrow is an extra
-
         return "row", read_parquet(path, wanted)
     if kind == "MDF":
         return "sample", read_mdf(path, wanted)
-    return "row", read_csv(path, wanted)
-
-
-def _error(path: Path, findings: list[Finding]) -> LogError:
-    fatal = [quoted(finding.text, LONGEST_FINDING) for finding in findings if finding.fatal]
-    return LogError("\n".join(f"{quoted(path)}: {text}" for text in fatal))
+    return "row", read_csv(path, wanted, mapping.format, progress)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
+from sim2real.logs.units import plain_unit, quantities
 
 Array = NDArray[np.float64]
 Text = NDArray[np.str_]
@@ -19,6 +23,10 @@ LONGEST_TEXT = 1_000
 """Characters of one sample of text: a picture's path."""
 MOST_TEXT = 120_000_000
 """Characters of a column of text, each sample as long as the longest: 480 MB."""
+
+MISSING = frozenset({"", "nan", "+nan", "-nan", "na", "n/a", "null"})
+"""Cells that say that a sample was lost, in lower case."""
+_BRACKETED = re.compile(r"(?P<name>.*\S)\s*(?P<mark>[\[(])(?P<unit>[^\[\]()]*)[\])]\s*")
 
 SHOWN = 3
 """Cells or rows of one kind that an error lists; the rest is counted."""
@@ -46,6 +54,8 @@ class Wanted:
         Columns whose value holds until the next one.
     base : tuple of str
         Columns whose time base is the log's, the first that is there counts; only files with several rasters need it.
+    time, time_form : str
+        The column that alone holds the time, "" where it is made of several; its form, "" to find it out.
     """
 
     numbers: frozenset[str]
@@ -53,6 +63,8 @@ class Wanted:
     identifiers: frozenset[str] = frozenset()
     held: frozenset[str] = frozenset()
     base: tuple[str, ...] = ()
+    time: str = ""
+    time_form: str = ""
 
 
 @dataclass(frozen=True)
@@ -82,6 +94,75 @@ class Table:
     findings: tuple[Finding, ...] = ()
     units: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+
+    def with_numbers(
+        self, numbers: dict[str, Array], notes: Iterable[str], findings: Iterable[Finding] = ()
+    ) -> Table:
+        """The table with other numbers and notes, and with further findings."""
+        return replace(self, numbers=numbers, notes=tuple(notes), findings=(*self.findings, *findings))
+
+    def kept(self, rows: NDArray[np.bool_]) -> Table:
+        """The table with some of its rows."""
+        if rows.all():
+            return self
+        return replace(
+            self,
+            numbers={name: values[rows] for name, values in self.numbers.items()},
+            text={name: cells[rows] for name, cells in self.text.items()},
+            rows=self.rows[rows],
+        )
+
+
+@dataclass(frozen=True)
+class Head:
+    """A column of a file: the name that it goes by, and its unit as stated, "" without one."""
+
+    name: str
+    unit: str
+
+
+def heads(names: Sequence[str], wanted: Wanted, units: Sequence[str] = ()) -> list[Head]:
+    """The columns of a file by their names as they stand, or without their units where they are wanted so.
+
+    Parameters
+    ----------
+    names : sequence of str
+        As they stand in the file.
+    wanted : Wanted
+        What of the file is read.
+    units : sequence of str
+        Units that stand elsewhere than in the names, "" without one.
+
+    Raises
+    ------
+    ValueError
+        A wanted column states two units.
+    """
+    asked = wanted.numbers | wanted.text
+    parts = [split_unit(name) for name in names]
+    bare = Counter(part for part, _ in parts)
+    made = []
+    for i, (name, (part, unit)) in enumerate(zip(names, parts, strict=True)):
+        key = part if name not in asked and part in asked and bare[part] == 1 and part not in names else name
+        own = units[i].strip("[](){} ") if i < len(units) else ""
+        if own and unit and plain_unit(own) != plain_unit(unit) and key in asked:
+            raise ValueError(
+                f"column {name!r} states two units, {unit!r} in its name and {own!r}; expected one."
+            )
+        made.append(Head(key, own or unit))
+    return made
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """A column's name without its unit, and the unit: of "Speed [km/h]", "n_fl (1/min)" or "a_x/m/s^2"."""
+    if found := _BRACKETED.fullmatch(name):
+        part, mark, unit = found["name"], found["mark"], found["unit"].strip()
+        if quantities(unit) or (mark == "[" and unit and not unit.isdigit()):
+            return part, unit
+    part, slash, unit = name.partition("/")
+    if slash and part and quantities(unit):
+        return part.strip(), unit.strip()
+    return name, ""
 
 
 def numbered(labels: Iterable[str]) -> Array:

@@ -7,9 +7,11 @@ from difflib import get_close_matches
 
 import numpy as np
 
-from sim2real.logs.contract import COLUMNS, IMAGE_PATH, REQUIRED, TIME, WHEEL_SPEEDS
+from sim2real.logs.contract import COLUMNS, IMAGE_PATH, POSITION, REQUIRED, TIME, WHEEL_SPEEDS
 from sim2real.logs.mapping import INTEGRAND_UNIT, Mapping, Spec
 from sim2real.logs.table import Array, Finding, Table, Wanted
+from sim2real.logs.times import times_of_numbers
+from sim2real.logs.units import UNITS
 from trpac_core.files import quoted
 
 BRIDGED_S = 0.25
@@ -25,12 +27,15 @@ def wanted_columns(mapping: Mapping) -> Wanted:
     """Which columns of a file the log format needs under a mapping."""
     sources = {name: mapping.sources(name) for name in COLUMNS}
     text = frozenset(sources.pop(IMAGE_PATH))
+    time = mapping.spec(TIME).column or ""
     return Wanted(
         numbers=frozenset(s for names in sources.values() for s in names) - text,
         text=text,
         identifiers=frozenset(sources["frame_id"]),
         held=frozenset(s for name, names in sources.items() if COLUMNS[name].held for s in names),
         base=tuple(s for name in WHEEL_SPEEDS for s in sources[name]),
+        time=time,
+        time_form=mapping.time_form,
     )
 
 
@@ -51,7 +56,10 @@ def missing_columns(table: Table, mapping: Mapping) -> list[Finding]:
                 findings.append(
                     Finding(f"column {copied!r} is missing, which {mapping.path} copies to {name}.")
                 )
-    absent = [name for name in REQUIRED if name not in mapped and name not in names]
+    # Stretches of the road that pictures are stamped with count from the road's zero, as the position does.
+    stamped = {"image_from_m", "image_to_m"} & {*mapped, *names}
+    needed = (*REQUIRED, POSITION) if stamped else REQUIRED
+    absent = [name for name in needed if name not in mapped and name not in names]
     if absent:
         findings.append(Finding(_absent_text(absent, names)))
     spare = [n for n in COLUMNS if n not in REQUIRED and n not in mapped and n not in names]
@@ -87,9 +95,18 @@ class Translated:
     findings: list[Finding]
 
 
-def read_time(table: Table, mapping: Mapping) -> Array | None:
-    """Time [s], shape (n,); None where its columns are not there or hold no numbers."""
-    return _Evaluation(table, _specs(mapping), None, {}, []).column(TIME)
+def read_time(table: Table, mapping: Mapping) -> tuple[Array | None, Table]:
+    """Time [s], shape (n,), None where its columns are not there or hold no numbers; the table with how it was read."""
+    spec = mapping.spec(TIME)
+    findings: list[Finding] = []
+    name = spec.column or ""
+    if name in table.numbers and not (spec.unit or table.units.get(name)):
+        times = times_of_numbers(table.numbers[name], mapping.time_form)
+        if times.note:
+            numbers = table.numbers | {name: times.time_s}
+            table = table.with_numbers(numbers, (*table.notes, f"time as {times.note}"))
+    time_s = _Evaluation(table, _specs(mapping), None, {}, findings).column(TIME)
+    return time_s, table.with_numbers(table.numbers, table.notes, findings)
 
 
 def translate(table: Table, mapping: Mapping, time_s: Array | None) -> Translated:
@@ -139,7 +156,45 @@ class _Evaluation:
             terms = [self.value(term, unit, name) for term in spec.sum]
             known = [term for term in terms if term is not None]
             return np.sum(known, axis=0) if len(known) == len(terms) else None
-        return _measured(self.table, spec, unit)
+        return self._measured(spec, unit, name)
+
+    def _measured(self, spec: Spec, unit: str, name: str) -> Array | None:
+        """A column of the file in `unit`: by the mapping's unit, else by the one that the file states."""
+        source = spec.column or ""
+        raw, stated = self.table.numbers.get(source), self.table.units.get(source)
+        if raw is None:
+            return None
+        own = self._factor(spec.model_copy(update={"unit": stated}), unit) if stated else None
+        if spec.unit is not None or not stated:
+            by = spec.factor(unit)
+            if own is not None and not np.isclose(own, by):
+                self.findings.append(
+                    Finding(
+                        f"column {source!r} is in {quoted(stated)} by the file and in {spec.unit} by the mapping; the "
+                        "mapping's is used.",
+                        fatal=False,
+                    )
+                )
+            return raw * by
+        if own is None:
+            if unit == "-" and COLUMNS[name].held:
+                return raw  # a class or a number: what stands there is no unit
+            line = f"{name}: {{column: {source!r}, unit: UNIT}}"
+            self.findings.append(
+                Finding(
+                    f"column {source!r} states the unit {quoted(stated, 40)!r}, which cannot become [{unit}]. A "
+                    f"mapping file with `{line}` says which it is; expected one of {', '.join(UNITS[unit])}."
+                )
+            )
+            return None
+        return raw * own
+
+    @staticmethod
+    def _factor(spec: Spec, unit: str) -> float | None:
+        try:
+            return spec.factor(unit)
+        except ValueError:
+            return None
 
     def _integral(self, time_s: Array, rate: Array, name: str) -> Array:
         total, bridged_s = integrate(time_s, rate)
@@ -163,13 +218,6 @@ def integrate(time_s: Array, values: Array) -> tuple[Array, float]:
     total = np.concatenate(([0.0], np.cumsum(0.5 * (filled[1:] + filled[:-1]) * np.diff(time_s))))
     ends = np.concatenate(([time_s[0]], time_s[known], [time_s[-1]]))
     return total, float(np.max(np.diff(ends)))
-
-
-def _measured(table: Table, spec: Spec, unit: str) -> Array | None:
-    raw = table.numbers.get(spec.column or "")
-    if raw is None:
-        return None
-    return raw * spec.factor(unit)
 
 
 def _specs(mapping: Mapping) -> dict[str, Spec]:
@@ -196,7 +244,7 @@ def _absent_text(absent: list[str], names: list[str]) -> str:
     ]
     what = "column" if len(absent) == 1 else "columns"
     line = f"{absent[0]}: {{column: NAME, unit: UNIT}}"
-    if absent == ["position_m"]:
+    if absent == [POSITION]:
         line = "position_m: {integrate: {copy: vehicle_speed_m_s}}"
     return (
         f"required {what} missing: {', '.join(hints)}. The file has: {_listed(names)}. If they are there under other "

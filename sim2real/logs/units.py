@@ -62,7 +62,7 @@ def factor(unit: str, quantity: str) -> float:
     >>> round(factor("km/h", "m/s") * 36.0, 9)
     10.0
     """
-    plain = _plain(unit)
+    plain = plain_unit(unit)
     exact, folded = _tables()[quantity]
     if plain in exact:
         return exact[plain]
@@ -75,7 +75,7 @@ def factor(unit: str, quantity: str) -> float:
 
 def quantities(unit: str) -> frozenset[str]:
     """The log format's units that a unit can become; empty for a text that is no unit."""
-    plain = _plain(unit)
+    plain = plain_unit(unit)
     return frozenset(
         quantity
         for quantity, (exact, folded) in _tables().items()
@@ -88,7 +88,7 @@ def _tables() -> dict[str, tuple[dict[str, float], dict[str, frozenset[float]]]]
     """By quantity: factors by the plain unit, and all factors by the unit without capitals."""
     tables = {}
     for quantity, units in UNITS.items():
-        exact = {_plain(name): value for name, value in units.items()}
+        exact = {plain_unit(name): value for name, value in units.items()}
         folded: dict[str, frozenset[float]] = {}
         for name, value in exact.items():
             folded[name.casefold()] = folded.get(name.casefold(), frozenset()) | {value}
@@ -96,5 +96,6 @@ def _tables() -> dict[str, tuple[dict[str, float], dict[str, frozenset[float]]]]
     return tables
 
 
-def _plain(unit: str) -> str:
+def plain_unit(unit: str) -> str:
+    """A unit without what does not matter in it: blanks, points, stars, brackets."""
     return _HYPHEN.sub("", unit.strip().translate(_PLAIN))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scenarios.effects import Effect
 from scenarios.errors import ScenarioError
 from sim2real.hypotheses.contest import Progress, run_all, silent
-from sim2real.logs import Log, log_of_frame
+from sim2real.logs import Log, log_of_frame, with_way
 from sim2real.logs.contract import COLUMNS
 from sim2real.logs.errors import LogError
 from sim2real.own_model.signals import TORQUES, Signals
@@ -227,7 +227,7 @@ class OwnModel:
             columns |= dict(zip(TORQUES, job.torque_nm[part.rows].T, strict=True))
             columns |= dict(zip(self.signals.read, outputs[at : at + count].T, strict=True))
             name = f"{self.unit.path.name} over {job.log.name}"
-            made = log_of_frame(pd.DataFrame(columns), self.signals.outputs, name)
+            made = with_way(log_of_frame(pd.DataFrame(columns), self.signals.outputs, name))
             if run.effect is not None:
                 made = replace(made, signals=run.effect.sense(made.time_s, made.signals))
             found.append(Stretch(made, part.from_s))

@@ -15,7 +15,7 @@ from scenarios.effects import EFFECTS
 from scenarios.errors import suggestion
 from scenarios.strict import load_strict, made
 from sim2real.logs.contract import COLUMNS
-from sim2real.logs.mapping import Mapping, MappingFile, specs_of
+from sim2real.logs.mapping import Mapping, MappingFile, mapping_of
 from sim2real.logs.units import factor
 from trpac_core.vehicle import WHEELS
 
@@ -188,5 +188,5 @@ def load_signals(path: str | Path) -> Signals:
         else value
         for name, value in file.start.items()
     }
-    columns = Mapping(Path(path), specs_of(outputs))
+    columns = mapping_of(outputs, Path(path))
     return Signals(Path(path), file.inputs, columns, file.initial, start, file.parameters)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scenarios.effects.base import mean_of_wheels
 from scenarios.files import RoadFile, RoadSegment, VehicleFile
-from sim2real.logs import Log, LogError, resample
+from sim2real.logs import Log, LogError, resample, with_way
 from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive, make_drive
 from sim2real.observing.noise import RESOLUTION
 from sim2real.observing.observer import Simulation
@@ -136,6 +136,7 @@ def make_inputs(log: Log, vehicle: VehicleFile) -> Inputs:
     LogError
         The car hardly moves.
     """
+    log = with_way(log)
     step_s = float(np.median(np.diff(log.time_s)))
     time_s, signals = resample(log, step_s)
     drive = make_drive(log.name, ANY_ROAD, time_s, signals, log.derived)

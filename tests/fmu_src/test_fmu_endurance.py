@@ -118,6 +118,7 @@ def test_parameters_that_would_keep_a_frame_for_ever_are_refused(
 def test_text_that_is_not_utf_8_is_told_and_taken_as_empty(open_unit: Open) -> None:
     # The wrapper hands over a list with a hole and an error pending, and would free the unit under the host.
     unit = open_unit()
+    unit.restore(unit.saved())
     reference = (ctypes.c_uint * 1)(unit.variables["image_path"].valueReference)
     text = (ctypes.c_char_p * 1)("Prüfstand.png".encode("latin-1"))
     for _ in range(2):

@@ -23,6 +23,8 @@ from fmu_src.packaging import BuildError, build_unit
 from fmu_src.ssp import (
     ESTIMATOR,
     PLANT,
+    SSC,
+    SSV,
     SYSTEMS,
     Wiring,
     build_package,
@@ -192,8 +194,32 @@ def test_a_changed_set_changes_the_run(units: dict[str, Path], tmp_path: Path) -
     assert result[f"{PLANT}.vehicle_speed"][0] == pytest.approx(12.5, abs=0.01)
     assert result[f"{PLANT}.theta.fl"][-1] == 0.25
     bound = {parameter.name: parameter.value for parameter in bound_parameters(changed).parameters}
-    assert bound["plant.initial.vehicle_speed"] == "12.5"
+    assert bound["plant.initial.vehicle_speed"] == 12.5
     assert bound["estimator.vehicle.mass"] == bound["plant.vehicle.mass"]
+
+
+@pytest.mark.e2e
+def test_a_set_of_the_system_in_km_h_wins_over_those_of_its_elements(
+    units: dict[str, Path], tmp_path: Path
+) -> None:
+    package = build_package(SYSTEMS["one_wheel"], units, tmp_path / "whole.ssp")
+    given = (
+        f'<ParameterSet xmlns="{SSV}" xmlns:ssc="{SSC}" version="1.0" name="fast"><Parameters>'
+        '<Parameter name="initial.vehicle_speed"><Real value="45" unit="km/h"/></Parameter></Parameters><Units>'
+        '<ssc:Unit name="km/h"><ssc:BaseUnit m="1" s="-1" factor="0.2777777777777778"/></ssc:Unit></Units>'
+        "</ParameterSet>"
+    )
+    binding = (
+        f'<ssd:ParameterBindings><ssd:ParameterBinding prefix="{PLANT}."><ssd:ParameterValues>{given}'
+        "</ssd:ParameterValues></ssd:ParameterBinding></ssd:ParameterBindings>"
+    )
+    with zipfile.ZipFile(package) as archive:
+        structure = archive.read("SystemStructure.ssd").decode()
+    changed = structure.replace("<ssd:Elements>", f"{binding}<ssd:Elements>", 1)
+    fast = with_file(package, tmp_path / "fast.ssp", "SystemStructure.ssd", changed.encode())
+    assert problems(fast) == []
+    result = simulate(fast, 0.01)
+    assert result[f"{PLANT}.vehicle_speed"][0] == pytest.approx(12.5, abs=0.01)
 
 
 LIBCOSIM = """

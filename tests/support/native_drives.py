@@ -23,7 +23,12 @@ WHEELS, SIDES = (".fl", ".fr", ".rl", ".rr"), (".left", ".right")
 """Ends of names of the unit of four wheels."""
 
 
-def drive(seed, steps, wheels=("",), sides=("",)):
+ODD_STEPS_S = (0.01, 1e-4)
+IMPOSSIBLE_STEPS_S = (0.0, -1.0, math.nan, 1e9, 11.0)
+"""Steps that units discard before the estimator sees them."""
+
+
+def drive(seed, steps, wheels=("",), sides=("",), odd_steps_s=ODD_STEPS_S):
     """Inputs and size of each step: driving, braking, backing, classes, and now and then something of no sense."""
     rng, speed = random.Random(seed), 12.0
     of_car = ["steering_angle", "longitudinal_acceleration", "yaw_rate", "lateral_acceleration"][
@@ -56,7 +61,7 @@ def drive(seed, steps, wheels=("",), sides=("",)):
         if rng.random() < 0.004:
             values[f"road_class{sides[-1]}"] = rng.choice([7, -5])
         odd = rng.random() < 0.01
-        yield values, rng.choice([0.0, 0.01, 1e-4, -1.0, math.nan, 1e9, 11.0]) if odd else 0.001
+        yield values, rng.choice(odd_steps_s) if odd else 0.001
 
 
 drive_of_four = partial(drive, wheels=WHEELS, sides=SIDES)

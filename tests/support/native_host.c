@@ -100,12 +100,12 @@ static void read_rows(const char *path)
     fclose(file);
 }
 
-static void step(fmi2Component unit, const double *row, double *out)
+static void step(fmi2Component unit, size_t k, const double *row, double *out)
 {
     const fmi2Integer integers[2] = {(int)row[INPUTS + 1], (int)row[INPUTS + 2]};
     fmi2SetReal(unit, real_inputs, INPUTS, row + 1);
     fmi2SetInteger(unit, integer_inputs, 2, integers);
-    check(fmi2DoStep(unit, 0.0, row[0], fmi2True) == fmi2OK, "step");
+    check(fmi2DoStep(unit, 1e-3 * (double)k, row[0], fmi2True) == fmi2OK, "step");
     fmi2GetReal(unit, outputs, (size_t)output_count, out);
 }
 
@@ -136,7 +136,7 @@ static void run(const char *path, int method)
     for (size_t k = 0; k < row_count; k++) {
         if (k == row_count / 2)
             unit = handed_over(unit, method);
-        step(unit, rows + k * ROW, out);
+        step(unit, k, rows + k * ROW, out);
         fwrite(out, sizeof(double), (size_t)output_count, file);
     }
     fclose(file);
@@ -148,7 +148,7 @@ static void *driven(void *result)
 {
     fmi2Component unit = opened(-1);
     for (size_t k = 0; k < row_count; k++)
-        step(unit, rows + k * ROW, result);
+        step(unit, k, rows + k * ROW, result);
     fmi2FreeInstance(unit);
     return NULL;
 }
@@ -183,7 +183,7 @@ static void last_long(long steps, long instances)
     for (long k = 0; k < steps; k++) {
         if (k == steps / 10)
             begun = resident_kb();
-        step(unit, rows + ((size_t)k % row_count) * ROW, out);
+        step(unit, (size_t)k, rows + ((size_t)k % row_count) * ROW, out);
     }
     printf("%ld %ld", begun, resident_kb());
     fmi2FreeInstance(unit);
@@ -191,7 +191,7 @@ static void last_long(long steps, long instances)
         if (k == instances / 10)
             begun = resident_kb();
         unit = opened(-1);
-        step(unit, rows, out);
+        step(unit, 0, rows, out);
         fmi2FreeInstance(unit);
     }
     printf(" %ld %ld\n", begun, resident_kb());
@@ -235,7 +235,7 @@ static void fuzz(unsigned seed, int calls)
 {
     static const char *const texts[] = {"", "road.png", "%s%n%s", NULL};
     fmi2Component unit = opened((int)(seed % 3));
-    double out[MOST];
+    double out[MOST], now_s = 0.0;
     state_of_random = seed;
     for (int k = 0; k < calls; k++) {
         const fmi2ValueReference any = draw(200) ? draw(COUNT) : draw(100000);
@@ -268,7 +268,9 @@ static void fuzz(unsigned seed, int calls)
             break;
         default: break;
         }
-        fmi2DoStep(unit, 0.001 * k, draw(20) ? 0.001 : odd(), fmi2True);
+        const double begin_s = draw(20) ? now_s : odd(), step_s = draw(20) ? 0.001 : odd();
+        if (fmi2DoStep(unit, begin_s, step_s, fmi2True) == fmi2OK)
+            now_s = begin_s + step_s;
         fmi2GetReal(unit, outputs, (size_t)output_count, out);
     }
     fmi2FreeInstance(unit);
@@ -296,7 +298,7 @@ static void bench(int method)
     check(all != NULL, "memory");
     for (size_t k = 0; k < row_count; k++) {
         const double begun = seconds();
-        step(unit, rows + k * ROW, out);
+        step(unit, k, rows + k * ROW, out);
         const double passed = seconds() - begun;
         total += passed;
         all[k] = passed;
@@ -324,7 +326,7 @@ int main(int argc, char **argv)
     const long before = allocations;
     double out[MOST];
     for (size_t k = 0; k < row_count; k++)
-        step(unit, rows + k * ROW, out);
+        step(unit, k, rows + k * ROW, out);
     check(allocations == before, "memory was allocated in a step");
     fmi2FreeInstance(unit);
     for (int k = 0; k < 10000; k++)

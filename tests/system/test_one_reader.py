@@ -24,7 +24,7 @@ OPENED = {
     "scenarios/yaml_text.py": {"yaml"},  # the reader of YAML
     "scenarios/vision_runs.py": {"VideoCapture"},  # of videos, behind the guard
     "scenarios/fmu_client/archives.py": {"open", "ZipFile"},  # of archives
-    "fmu_src/ssp_client.py": {"XMLParser", "fromstring"},  # of what the reader of archives hands on
+    "fmu_src/ssp_parameters.py": {"XMLParser", "fromstring"},  # of what the reader of archives hands on
     "fmu_src/trial.py": {
         "parse"
     },  # in a process that may die, of a unit that the reader of archives has unpacked

@@ -273,7 +273,7 @@ def test_a_mapping_holds_for_a_frame_too(log, tmp_path):
         (lambda f: f.assign(accel_x_m_s2="fast"), "column accel_x_m_s2 holds .*; expected numbers"),
         (lambda f: pd.concat([f, f[["accel_x_m_s2"]]], axis=1), "stands 2 times"),
         (lambda f: f.assign(time_s=f["time_s"][::-1].to_numpy()), "time_s"),
-        (lambda f: f.iloc[:0], ""),
+        (lambda f: f.iloc[:0], "has no rows"),
     ],
 )
 def test_a_frame_that_is_no_log_is_refused(log, change, said):

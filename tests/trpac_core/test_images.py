@@ -61,6 +61,11 @@ def test_12_bits_in_16_are_found_by_their_range():
     assert (decode_image(encoded(".png", raw), bits=16) == raw >> 8).all()
 
 
+def test_16_bits_of_another_byte_order_are_read():
+    raw = PICTURE.astype(np.uint16) << 4
+    assert (eight_bits(raw.astype(">u2")) == PICTURE).all()
+
+
 def test_floats_from_0_to_1_are_scaled():
     assert (eight_bits(PICTURE / 255.0) == PICTURE).all()
     assert (eight_bits((PICTURE / 255.0).astype(np.float32)) == PICTURE).all()
@@ -70,10 +75,15 @@ def test_floats_from_0_to_1_are_scaled():
     ("image", "bits", "said"),
     [
         (PICTURE.astype(float), None, "floats beyond 0 to 1"),
-        (np.full((2, 2, 3), np.nan), None, "floats beyond 0 to 1"),
+        (np.full((2, 2, 3), np.nan), None, "floats beyond 0 to 1, or NaN"),
         (PICTURE.astype(np.int32), None, "values of int32"),
         (PICTURE.astype(np.uint16) << 8, 12, "expected less than 4096 with 12 bits"),
+        (PICTURE.astype(np.int64), None, "values of int64"),
+        (PICTURE > 9, None, "values of bool"),
+        (PICTURE.astype(complex), None, "values of complex128"),
         (PICTURE, 7, "bits is 7; expected 8 to 16"),
+        (PICTURE, "12", "bits is '12'; expected 8 to 16"),
+        (PICTURE, 12.5, "bits is 12.5; expected 8 to 16"),
     ],
 )
 def test_values_of_no_picture_are_refused(image, bits, said):
@@ -81,10 +91,142 @@ def test_values_of_no_picture_are_refused(image, bits, said):
         eight_bits(image, "frame", bits)
 
 
-def test_exif_turn_is_not_applied():
-    exif = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"
-    turned = JPEG[:2] + b"\xff\xe1" + struct.pack(">H", len(exif) + 2) + exif + JPEG[2:]
-    assert decode_image(turned).shape == PICTURE.shape
+def tiff(turn: int) -> bytes:
+    """EXIF data that note one of the eight turns."""
+    return b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0" + bytes([turn]) + bytes(6)
+
+
+TURNS = {
+    1: lambda p: p,
+    2: lambda p: p[:, ::-1],
+    3: lambda p: p[::-1, ::-1],
+    4: lambda p: p[::-1],
+    5: lambda p: p.swapaxes(0, 1),
+    6: lambda p: p.swapaxes(0, 1)[:, ::-1],
+    7: lambda p: p.swapaxes(0, 1)[::-1, ::-1],
+    8: lambda p: p.swapaxes(0, 1)[::-1],
+}
+"""What a viewer does with a picture, by the note of EXIF."""
+
+
+@pytest.mark.parametrize("turn", TURNS)
+def test_exif_turns_are_applied_where_they_are_asked_for(turn):
+    def part(content: bytes, marker: bytes = b"\xff\xe1") -> bytes:
+        return marker + struct.pack(">H", len(content) + 2) + content
+
+    # A profile of colours may come before the note.
+    profile = 2 * part(b"ICC_PROFILE\0" + bytes(40_000), b"\xff\xe2")
+    jpeg = JPEG[:2] + profile + part(b"Exif\0\0" + tiff(turn)) + JPEG[2:]
+    png = PNG[:33] + chunk(b"eXIf", tiff(turn)) + PNG[33:]
+    for data, stored in ((jpeg, decode_image(JPEG)), (png, PICTURE)):
+        assert np.array_equal(decode_image(data), stored)
+        assert np.array_equal(decode_image(data, upright=True), TURNS[turn](stored))
+
+
+# Kinds of PNG
+
+
+GREY = PICTURE[..., 0]
+RGB = PICTURE[..., ::-1]
+COLOURS = np.random.default_rng(3).integers(0, 256, (256, 3), dtype=np.uint8)
+ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
+"""The passes of an interlaced PNG: first column and row, and the distances of both."""
+
+
+def chunk(kind: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+
+
+def png_of(values, depth: int, kind: int, *more: bytes, interlaced: bool = False) -> bytes:
+    """A PNG of values, shape (height, width) or (height, width, channels), of this many bits and this colour type."""
+    header = struct.pack(">IIBBBBB", values.shape[1], values.shape[0], depth, kind, 0, 0, interlaced)
+    steps = ADAM7 if interlaced else ((0, 0, 1, 1),)
+    rows = [row for x, y, dx, dy in steps for row in values[y::dy, x::dx]]
+    if depth < 8:
+        digits = [np.unpackbits(row[:, None].astype(np.uint8), axis=1)[:, -depth:] for row in rows]
+        rows = [np.packbits(bits.reshape(-1)) for bits in digits]
+    content = b"".join(b"\0" + row.astype(">u2" if depth == 16 else np.uint8).tobytes() for row in rows)
+    return (
+        PNG[:8]
+        + chunk(b"IHDR", header)
+        + b"".join(more)
+        + chunk(b"IDAT", zlib.compress(content))
+        + chunk(b"IEND", b"")
+    )
+
+
+def with_alpha(values, depth: int):
+    return np.dstack((values, np.full(values.shape[:2], 7 if depth == 8 else 7000)))
+
+
+def three(grey):
+    return np.repeat(grey[..., None], 3, axis=2)
+
+
+PALETTE = chunk(b"PLTE", COLOURS.tobytes())
+KINDS = {
+    "grey of 1 bit": (png_of(GREY >> 7, 1, 0), three((GREY >> 7) * 255)),
+    "grey of 2 bits": (png_of(GREY >> 6, 2, 0), three((GREY >> 6) * 85)),
+    "grey of 4 bits": (png_of(GREY >> 4, 4, 0), three((GREY >> 4) * 17)),
+    "grey of 16 bits": (png_of(GREY.astype(int) * 257, 16, 0), three(GREY)),
+    "grey of 12 bits in 16": (png_of(GREY.astype(int) << 4, 16, 0), three(GREY)),
+    "grey, alpha": (png_of(with_alpha(GREY, 8), 8, 4), three(GREY)),
+    "grey, alpha, 16 bits": (png_of(with_alpha(GREY.astype(int) * 257, 16), 16, 4), three(GREY)),
+    "grey, alpha, 12 bits in 16": (png_of(with_alpha(GREY.astype(int) << 4, 16), 16, 4), three(GREY)),
+    "grey, one transparent": (png_of(GREY, 8, 0, chunk(b"tRNS", b"\0\x20")), three(GREY)),
+    "colours, alpha": (png_of(with_alpha(RGB, 8), 8, 6), PICTURE),
+    "colours, alpha, 16 bits": (png_of(with_alpha(RGB.astype(int) * 257, 16), 16, 6), PICTURE),
+    "colours, alpha, 12 bits in 16": (png_of(with_alpha(RGB.astype(int) << 4, 16), 16, 6), PICTURE),
+    "palette of 1 bit": (
+        png_of(GREY >> 7, 1, 3, chunk(b"PLTE", COLOURS[:2].tobytes())),
+        COLOURS[GREY >> 7],
+    ),
+    "palette of 4 bits": (
+        png_of(GREY >> 4, 4, 3, chunk(b"PLTE", COLOURS[:16].tobytes())),
+        COLOURS[GREY >> 4],
+    ),
+    "palette": (png_of(GREY, 8, 3, PALETTE), COLOURS[GREY]),
+    "palette, transparent": (png_of(GREY, 8, 3, PALETTE, chunk(b"tRNS", bytes(256))), COLOURS[GREY]),
+    "interlaced grey": (png_of(GREY, 8, 0, interlaced=True), three(GREY)),
+    "interlaced, 16 bits": (png_of(RGB.astype(int) * 257, 16, 2, interlaced=True), PICTURE),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_kind_of_png_is_read(kind):
+    data, expected = KINDS[kind]
+    expected = expected[..., ::-1] if kind.startswith("palette") else expected
+    assert np.array_equal(decode_image(data), expected)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [png_of(GREY.astype(int) * 257, 16, 3, PALETTE), png_of(GREY, 8, 3)],
+    ids=["palette of 16 bits", "no palette"],
+)
+def test_kinds_of_png_that_there_are_not_are_damaged(data):
+    with pytest.raises(ImageError, match="damaged"):
+        decode_image(data)
+
+
+def test_the_first_header_of_a_png_counts_and_comes_first(monkeypatch):
+    small = png_of(GREY, 8, 0)
+    size = struct.pack(">IIBBBBB", 20_000, 20_000, 8, 2, 0, 0, 0)
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("decoded"))
+    with pytest.raises(ImageError, match="20000 x 20000 pixels"):
+        decode_image(small[:8] + chunk(b"IHDR", size) + small[8:])
+    with pytest.raises(ImageError, match="does not begin with a header"):
+        decode_image(small[:8] + chunk(b"tEXt", b"a\0b") + small[8:])
+
+
+def test_a_jpeg_of_four_colours_is_read():
+    """CMYK, as printers have it, of one even colour; made by Pillow 12."""
+    import io
+
+    image = pytest.importorskip("PIL.Image").new("CMYK", (128, 80), (0, 128, 255, 0))
+    image.save(file := io.BytesIO(), "JPEG", quality=95)
+    seen = decode_image(file.getvalue())
+    assert np.abs(seen.reshape(-1, 3).astype(int) - (0, 127, 255)).max() <= 3
 
 
 def test_progressive_jpeg_and_trailing_bytes():

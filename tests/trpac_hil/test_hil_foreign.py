@@ -197,6 +197,26 @@ def test_codes_of_no_value_and_values_out_of_range_are_lost_and_the_latter_count
     assert inputs.value("accel_x_m_s2", 4 * MS) == 0.0
 
 
+def test_values_that_the_mapping_names_as_invalid_are_lost(tmp_path: Path) -> None:
+    named = 'invalid: {"*": [300.0], Motion.LongAcc: [-4.0], YawRate: [0.0]}\ncounters:'
+    codec = codec_of(tmp_path, signals=changed(SIGNALS, ("counters:", named)))
+    inputs = Inputs(codec, unsaid)
+    names = ("vehicle_speed_m_s", "accel_x_m_s2", "yaw_rate_rad_s")
+    for count, (values, lost) in enumerate(
+        [((300.0, -4.0, 0.0), (True, True, True)), ((299.99, -3.999, 0.01), (False, False, False))]
+    ):
+        said(
+            inputs,
+            codec,
+            "Motion",
+            count * MS,
+            count,
+            **dict(zip(("VehSpd", "LongAcc", "YawRate"), values, strict=True)),
+        )
+        assert tuple(math.isnan(inputs.value(name, count * MS)) for name in names) == lost
+    assert inputs.heard["Motion"].outside == {}
+
+
 def test_a_stated_counter_counts_over_its_stated_range_and_what_only_sounds_like_one_does_not(
     tmp_path: Path,
 ) -> None:
@@ -303,6 +323,7 @@ def test_a_signal_that_is_missing_is_named_also_where_its_table_of_values_is_sti
          "vehicle_speed_m_s: integrate is for logs"),
         ([], [("{constant: 0.0}", "{copy: accel_y_m_s2}")], "copy: 'accel_y_m_s2' is in [m/s2]"),
         ([], [("counters: {Motion: AliveCnt", "counters: {Motion: Alive")], "has no Motion.Alive."),
+        ([], [("counters:", "invalid: {Motion.Speed: [1.0]}\ncounters:")], "has no signal Motion.Speed."),
         ([], [("counters:", "checksums: {Motion: Crc}\ncounters:")], "checksums"),
         ([], [("Motion: AliveCnt", "Motion: VehSpd")], "VehSpd does not count by one from 0"),
         ([("BO_ 700 ", "BO_ 512 ")], [], "Estimate is sent with the identifier 0x200 of trpac.dbc, which is that of"),

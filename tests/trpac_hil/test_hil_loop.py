@@ -107,6 +107,16 @@ def test_a_sleep_that_overshoots_is_an_overrun_of_the_slots_that_it_slept_throug
     assert counts.worst_ns == int(2.2 * MS)
 
 
+def test_after_a_halt_of_more_than_the_units_longest_step_the_unit_goes_on() -> None:
+    bench = Bench()
+    bench.clock.overshoot_ns = {6: 12_000 * MS}
+    bench.run(12_030)
+    times, steps, _ = zip(*bench.unit.steps, strict=True)
+    assert max(steps) == 10.0
+    assert np.diff(times) == pytest.approx(steps[:-1]), "each step begins where the last one ended"
+    assert bench.sent("Status")[-2] == RUNNING
+
+
 def test_slots_that_pass_at_the_very_end_are_counted_and_none_beyond_it() -> None:
     bench = Bench()
     bench.clock.overshoot_ns = {9: 50 * MS}

@@ -97,7 +97,8 @@ def decode_image(
         raise ImageError(
             f"{name}: neither JPEG nor PNG (starts with {data[:8].hex(' ')}). Convert the picture."
         )
-    return _decoded(data, name, cv2.IMREAD_COLOR_BGR, bits) if upright and _turned(data) else image
+    turned = upright and (b"Exif\0" in data or b"eXIf" in data)
+    return _decoded(data, name, cv2.IMREAD_COLOR_BGR, bits) if turned else image
 
 
 def eight_bits(image: NDArray[np.generic], name: str = "image", bits: int | None = None) -> NDArray[np.uint8]:
@@ -118,13 +119,13 @@ def eight_bits(image: NDArray[np.generic], name: str = "image", bits: int | None
     ImageError
         If the values are of another type or range.
     """
-    if bits is not None and not 8 <= bits <= 16:
-        raise ImageError(f"{name}: bits is {bits}; expected 8 to 16.")
+    if bits is not None and bits not in range(8, 17):
+        raise ImageError(f"{name}: bits is {bits!r}; expected 8 to 16.")
     if image.dtype == np.uint8:
         return image.astype(np.uint8, copy=False)
-    if image.dtype == np.uint16:
+    if image.dtype.newbyteorder("=") == np.uint16:
         most = int(image.max(initial=0))
-        used = bits or (RAW_BITS if most < 1 << RAW_BITS else 16)
+        used = int(bits or 0) or (RAW_BITS if most < 1 << RAW_BITS else 16)
         if most >= 1 << used:
             raise ImageError(f"{name}: a value of {most}; expected less than {1 << used} with {used} bits.")
         return (image.astype(np.uint16, copy=False) >> (used - 8)).astype(np.uint8)
@@ -132,7 +133,7 @@ def eight_bits(image: NDArray[np.generic], name: str = "image", bits: int | None
         shares = image.astype(np.float64, copy=False)
         if not ((shares >= 0.0) & (shares <= 1.0)).all():
             raise ImageError(
-                f"{name}: floats beyond 0 to 1; expected shares of white. Divide by the greatest value."
+                f"{name}: floats beyond 0 to 1, or NaN; expected shares of white. Divide by the greatest value."
             )
         return np.rint(shares * 255.0).astype(np.uint8)
     raise ImageError(f"{name}: values of {image.dtype}; expected uint8, uint16, or floats from 0 to 1.")
@@ -151,10 +152,6 @@ def _decoded(
     if image is None:
         raise ImageError(f"{name}: damaged; the picture cannot be decoded. Copy or record it again.")
     return eight_bits(image, name, bits)
-
-
-def _turned(data: bytes) -> bool:
-    return b"Exif\0" in data[:65536] or b"eXIf" in data
 
 
 def raw_bgr_image(
@@ -269,11 +266,12 @@ def _check_png(data: bytes, name: str) -> tuple[int, int]:
             raise _cut_short(name)
         if zlib.crc32(data[at + 4 : end - 4]) != struct.unpack_from(">I", data, end - 4)[0]:
             raise ImageError(f"{name}: damaged PNG, wrong checksum of the chunk at byte {at}. Copy it again.")
-        if kind == b"IHDR" and length == 13:
+        if size is None:
+            if kind != b"IHDR" or length != 13:
+                raise ImageError(
+                    f"{name}: damaged PNG that does not begin with a header. Copy or record it again."
+                )
             size = struct.unpack_from(">II", data, at + 8)
         if kind == b"IEND":
-            break
+            return size[0], size[1]
         at = end
-    if size is None:
-        raise ImageError(f"{name}: damaged PNG without a header. Copy or record it again.")
-    return size[0], size[1]

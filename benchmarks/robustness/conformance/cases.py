@@ -200,7 +200,7 @@ class Direct:
     """The unit's own code, called without FMI; the yardstick of every client."""
 
     def __init__(self, case: Case, parameters: Values | None = None) -> None:
-        self._case, self._slave = case, _slave(case)
+        self._case, self._slave, self._time_s = case, _slave(case), 0.0
         self._slave.values.update(parameters or {})
         self._slave.exit_initialization_mode()
 
@@ -210,7 +210,8 @@ class Direct:
         """The watched outputs after these steps."""
         self._slave.values.update(inputs or {})
         for _ in range(count):
-            self._slave.do_step(0.0, step_s)
+            self._slave.do_step(self._time_s, step_s)
+            self._time_s += step_s
         return {name: self._slave.values[name] for name in self._case.watched}
 
 

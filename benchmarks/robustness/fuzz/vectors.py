@@ -16,16 +16,16 @@ from typing import Any
 import numpy as np
 
 from benchmarks.robustness.conformance.cases import CASES
-from benchmarks.robustness.conformance.operations import OK, Unit
+from benchmarks.robustness.conformance.operations import DISCARD, OK, STEP_S, Unit
 from benchmarks.robustness.conformance.outcome import NotAsExpectedError
 from benchmarks.robustness.conformance.transports import Fmpy
-from trpac_core.sensors import PLAUSIBLE
+from trpac_core.sensors import LONGEST_STEP_S, PLAUSIBLE
 
 from .mutations import Rng
 
-DISCARD = 2
 ODD = (math.nan, math.inf, -math.inf, 1e308, -1e308, 1e-308, -0.0, 0.0, 1e9, -1e9, 2.0**31, 5e-324)
 ODD_STEPS_S = (0.0, -0.001, math.nan, math.inf, 1e-9, 1e-12, 1.0, 100.0, 1e300)
+JUMPS_S = (math.nan, math.inf, -1e-3, 2.0, -1.0, 1e9)
 ODD_INTEGERS = (-(2**31), 2**31 - 1, -2, -1, 0, 1, 2, 3, 255)
 SHARE = {
     "step": 0.82,
@@ -142,7 +142,7 @@ class Driven:
         self._start = {n: _started(v, v.start) for n, v in inputs_of(unit).items()}
         self._now = dict(self._start)
         self._flags: list[str] = []
-        self._discards = bool(parameters)
+        self._discards, self._clocked = bool(parameters), False
         return unit
 
     def act(self, rng: Rng) -> list[str]:
@@ -167,10 +167,11 @@ class Driven:
         self._unit.set(values)
         self._now |= values
 
-    def _step(self, rng: Rng, step_s: float = 0.001) -> list[str]:
+    def _step(self, rng: Rng, step_s: float = STEP_S, off_s: float = 0.0) -> list[str]:
         self._set_some(rng)
         before, bad = self._flags, rubbish(self._now, self._pictures)
-        self._step_on(step_s)
+        if not self._step_on(step_s, off_s=off_s):
+            return []  # nothing has changed
         self.taken_down += any(concerned(flag, bad) for flag in before)
         return [
             f"{flag} is up with rubbish on {', '.join(sorted(concerned(flag, bad)))}"
@@ -178,13 +179,17 @@ class Driven:
             if concerned(flag, bad)
         ]
 
-    def _step_on(self, step_s: float, count: int = 1) -> None:
+    def _step_on(self, step_s: float, count: int = 1, off_s: float = 0.0) -> bool:
+        """Steps, which begin this much away from where the last one ended; whether they can be taken."""
+        good = 0.0 < step_s <= LONGEST_STEP_S and off_s == 0.0
+        allowed = ((OK, DISCARD) if self._discards else (OK,)) if good else (DISCARD,)
         for _ in range(count):
-            self._unit.call(
-                "step", "0x0p+0", step_s.hex(), allowed=(OK, DISCARD) if self._discards else (OK,)
-            )
+            begin_s = self._unit.time_s + off_s
+            if self._unit.call("step", begin_s.hex(), step_s.hex(), allowed=allowed).status == OK:
+                self._clocked, self._unit.time_s = True, self._unit.time_s + step_s
         self._flags = self._unit.flags()
         self.seen_up += bool(self._flags)
+        return good
 
     def _stretch(self, rng: Rng) -> list[str]:
         """Good input for more than a second: whatever there was before, the road ahead is known again."""
@@ -197,7 +202,10 @@ class Driven:
         return []
 
     def _odd_step(self, rng: Rng) -> list[str]:
-        return self._step(rng, float(ODD_STEPS_S[int(rng.integers(len(ODD_STEPS_S)))]))
+        step_s = float(rng.choice(ODD_STEPS_S))
+        # The first step, and that after a restored state, begin anywhere.
+        off_s = float(rng.choice(JUMPS_S)) if self._clocked and rng.random() < 0.5 else 0.0
+        return self._step(rng, step_s, off_s)
 
     def _restart(self, rng: Rng) -> list[str]:
         """Reset, or free and instantiate, with odd parameters at times."""
@@ -220,6 +228,7 @@ class Driven:
     def _state(self, _: Rng) -> list[str]:
         if self._saved:
             self._unit.call("restore", "0")
+            self._clocked = False
             self._unit.call("drop", "0")
             self._look()
         else:

@@ -146,16 +146,10 @@ static void add_readings(Text *text, const Sensors *sensors)
     add(text, ". Check the signal's source and unit.");
 }
 
-void add_unusable(Text *text, Unusable reason, double step_s, const Sensors *sensors)
+void add_unusable(Text *text, Unusable reason, const Sensors *sensors)
 {
     if (reason == Unusable_READING) {
         add_readings(text, sensors);
-    } else if (reason == Unusable_STEP) {
-        add(text, "Step size is ");
-        add_number(text, step_s);
-        add(text, " s; expected 0 to ");
-        add_short(text, LONGEST_STEP);
-        add(text, " s. No time has passed.");
     } else if (reason == Unusable_LOAD) {
         add(text, "vertical_load_n is ");
         add_short(text, sensors->vertical_load_n.value);

@@ -10,6 +10,8 @@
 enum {
     NOT_INITIALISED,
     NOT_READY,
+    STEP_SIZE,
+    STEP_BEGIN,
     LONG_STRING,
     STATE_OTHER,
     STATE_BUILD,
@@ -52,7 +54,7 @@ bool settings_good(const EstimatorConfig *config, Text *problem);
 /* Whether a class by bus can be used; else what is wrong with it is added to what is wrong with others. */
 bool class_good(Text *why, const char *name, int road_class, const char *confidence_name, double confidence);
 /* The sentence on what makes a step's input unusable. */
-void add_unusable(Text *text, Unusable reason, double step_s, const Sensors *sensors);
+void add_unusable(Text *text, Unusable reason, const Sensors *sensors);
 /* Which readings are no road car's, as bits. */
 unsigned implausible(const Sensors *sensors);
 /* The sentences on a tyre or a wheel that is not as told; false where there is nothing to say. */

@@ -36,7 +36,7 @@ static void begin(Unit *unit)
     memcpy(unit->memory.real, REAL_STARTS, sizeof REAL_STARTS);
     memcpy(unit->memory.integer, INTEGER_STARTS, sizeof INTEGER_STARTS);
     memcpy(unit->memory.boolean, BOOLEAN_STARTS, sizeof BOOLEAN_STARTS);
-    unit->initialising = unit->stale = unit->computed = false;
+    unit->initialising = unit->stale = unit->computed = unit->stepped = false;
     unit->unknown_count = 0;
     memset(unit->told, 0, sizeof unit->told);
     memset(unit->told_car, 0, sizeof unit->told_car);
@@ -156,8 +156,39 @@ Status exit_initialisation(Unit *unit)
     return OK;
 }
 
+/* Why a step cannot be taken: its sort of message, and the message. MESSAGES where it can. */
+static int step_problem(const Unit *unit, double begin_s, double step_s, Text *text)
+{
+    static const char *const NO_TIME = " The step is discarded and no time has passed.";
+    if (!(0.0 < step_s && step_s <= LONGEST_STEP)) {
+        start(text, MODEL ": step size is ");
+        add_number(text, step_s);
+        add(text, " s; expected above 0 and up to ");
+        add_short(text, LONGEST_STEP);
+        add(text, " s. Step again with such a size.");
+        add(text, NO_TIME);
+        return STEP_SIZE;
+    }
+    const bool finite = isfinite(begin_s);
+    if (finite && !(unit->stepped && fabs(begin_s - unit->memory.time_s) > GREATEST_JUMP * step_s))
+        return MESSAGES;
+    start(text, MODEL ": the step begins at ");
+    add_number(text, begin_s);
+    add(text, " s; expected ");
+    if (finite) {
+        add_number(text, unit->memory.time_s);
+        add(text, " s, where the last one ended. Step again from there, or restore a state or reset the unit before "
+                  "time jumps.");
+    } else {
+        add(text, "a finite time. Step again from one.");
+    }
+    add(text, NO_TIME);
+    return STEP_BEGIN;
+}
+
 Status do_step(Unit *unit, double now_s, double step_s)
 {
+    Text text;
     if (!unit)
         return ERROR;
     if (!unit->memory.ready) {
@@ -166,8 +197,14 @@ Status do_step(Unit *unit, double now_s, double step_s)
                 MODEL ": a step was asked for before the initialisation has ended; it is discarded.");
         return DISCARD;
     }
+    const int problem = step_problem(unit, now_s, step_s, &text);
+    if (problem != MESSAGES) {
+        tell(unit, &unit->told[problem], ERROR, text.text);
+        return DISCARD;
+    }
     unit_step(unit, step_s);
-    unit->memory.time_s = now_s + (0.0 <= step_s && step_s <= LONGEST_STEP ? step_s : 0.0);
+    unit->memory.time_s = now_s + step_s;
+    unit->stepped = true;
     return OK;
 }
 
@@ -375,7 +412,7 @@ Status restore_state(Unit *unit, const void *from)
         return OK;
     }
     memcpy(&unit->memory, &state->memory, sizeof unit->memory);
-    unit->computed = false;
+    unit->computed = unit->stepped = false;
     unit->initialising = unit->stale = !unit->memory.initialised;
     return OK;
 }

@@ -29,6 +29,7 @@ typedef struct Unit Unit;
 struct Unit {
     Memory memory;
     bool initialising, stale, computed; /* outputs can be read while the host initialises */
+    bool stepped; /* the next step begins at memory.time_s; else at any time */
     /* What has been told already: each sort of message is told once. */
     bool told[MESSAGES], told_reference[COUNT], told_get[KINDS], told_car[CAR_TEXTS];
     bool told_readings[SUBJECTS][1 << PARTS], told_reason[SUBJECTS][REASONS];

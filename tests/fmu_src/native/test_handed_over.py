@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 from native_calls import bits, build
-from native_drives import SIDES, WHEELS, drive
+from native_drives import IMPOSSIBLE_STEPS_S, ODD_STEPS_S, SIDES, WHEELS, drive
 
 from fmu_src.native.build import NATIVE_UNITS
 from fmu_src.native.estimator import estimator_program
@@ -111,7 +111,9 @@ def inputs_of_four(held, values):
 def test_python_and_c_by_turns_give_what_python_alone_does(in_c, made, inputs, ends, method):
     alone, by_turns, held = made(method), made(method), {}
     seen = []
-    for step, (values, step_s) in enumerate(drive(method.value + 1, STEPS, *ends)):
+    for step, (values, step_s) in enumerate(
+        drive(method.value + 1, STEPS, *ends, odd_steps_s=(*ODD_STEPS_S, *IMPOSSIBLE_STEPS_S))
+    ):
         held |= values
         if step % TURN == 0:  # as a unit that is saved, and one that goes on from there
             saved = json.dumps(by_turns.state())

@@ -114,7 +114,7 @@ static void tell_subject(Unit *unit, bool *told, int subject, const char *senten
 
 /* Tell of unusable readings, by whom they concern; what all wheels share is the car's. */
 static void tell_readings(
-    Unit *unit, const CarSensors *car, const Unusable reasons[WHEELS], double step_s, const Sensors sensors[WHEELS])
+    Unit *unit, const CarSensors *car, const Unusable reasons[WHEELS], const Sensors sensors[WHEELS])
 {
     Text texts[WHEELS];
     bool alike = true, any = false;
@@ -122,7 +122,7 @@ static void tell_readings(
         start(&texts[k], "");
         any = any || reasons[k] != Unusable_NOTHING;
         if (reasons[k] != Unusable_NOTHING)
-            add_unusable(&texts[k], reasons[k], step_s, &sensors[k]);
+            add_unusable(&texts[k], reasons[k], &sensors[k]);
         alike = alike && reasons[k] != Unusable_NOTHING && strcmp(texts[k].text, texts[0].text) == 0;
     }
     if (!any)
@@ -184,6 +184,6 @@ void unit_step(Unit *unit, double step_s)
     }
     claim_car(inner, loads.loads_n);
     if (any)
-        tell_readings(unit, &car, reasons, step_s, sensors);
+        tell_readings(unit, &car, reasons, sensors);
     tell_car(unit);
 }

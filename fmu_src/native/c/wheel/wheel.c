@@ -92,7 +92,7 @@ void unit_step(Unit *unit, double step_s)
     if (reason != Unusable_NOTHING) {
         Text text;
         start(&text, MODEL ": ");
-        add_unusable(&text, reason, step_s, &sensors);
+        add_unusable(&text, reason, &sensors);
         tell(unit, told_of(unit, 0, reason, &sensors), WARNING, text.text);
     }
     tell_car(unit);

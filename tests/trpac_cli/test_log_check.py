@@ -1,0 +1,100 @@
+"""`trpac log check`: what is shown of a log, what is written, and the exit codes."""
+
+import cv2
+import numpy as np
+import pytest
+from command_line import run, words
+from log_maker import make_frame, save
+
+import trpac
+from sim2real.logs import load_mapping, read_log
+
+WHEELS = {"fl": "VL", "fr": "VR", "rl": "HL", "rr": "HR"}
+GERMAN = {"time_s": "Zeit [s]", "vehicle_speed_m_s": "Geschw [km/h]", "accel_x_m_s2": "Beschl_x [m/s²]"}
+GERMAN |= {f"wheel_speed_{w}_rad_s": f"Drehzahl {theirs} [1/min]" for w, theirs in WHEELS.items()}
+GERMAN |= {f"wheel_torque_{w}_nm": f"Moment {theirs} [Nm]" for w, theirs in WHEELS.items()}
+
+
+@pytest.fixture
+def frame():
+    return make_frame()
+
+
+@pytest.fixture
+def german(frame, tmp_path):
+    theirs = frame.drop(columns="position_m").rename(columns=GERMAN)
+    theirs["Geschw [km/h]"] *= 3.6
+    for name in theirs:
+        if name.endswith("[1/min]"):
+            theirs[name] *= 30.0 / np.pi
+    theirs.to_csv(tmp_path / "messung.csv", sep=";", decimal=",", index=False, encoding="cp1252")
+    return tmp_path / "messung.csv"
+
+
+def test_a_plain_log_is_fit(frame, tmp_path):
+    done = run("log", "check", save(frame, tmp_path / "log.csv"))
+    assert done.exit_code == 0
+    text = words(done.output)
+    assert "301 rows, read as: the plain form" in text
+    assert "For trpac estimate: usable." in text
+    assert "For trpac gap diagnose: usable." in text
+
+
+def test_a_mapping_is_proposed_corrected_by_nobody_and_good(frame, german, tmp_path):
+    proposed, picture, out = tmp_path / "map.yaml", tmp_path / "a.png", tmp_path / "normal.parquet"
+    done = run("log", "check", german, "--propose", proposed, "--out", out, "--picture", picture)
+    assert done.exit_code == 1
+    assert "required columns missing: time_s" in words(done.output)
+    assert not out.exists()
+    assert picture.exists()
+    assert set(load_mapping(proposed).columns) == set(GERMAN)
+    assert "# position_m: {integrate: {copy: vehicle_speed_m_s}}" in proposed.read_text(encoding="utf-8")
+    done = run("log", "check", german, "--map", proposed, "--out", out, "--picture", picture)
+    assert done.exit_code == 0, done.output
+    text = words(done.output)
+    assert "read as: CP1252; semicolons; decimal comma" in text
+    assert "vehicle_speed_m_s Geschw [km/h] km/h 0.277778 100" in text
+    assert "no measured position" in text
+    log = read_log(out)
+    assert log.warnings == ()
+    for name in set(log.signals) - {"position_m"}:
+        assert np.allclose(log.signals[name], frame[name], rtol=1e-12), name
+    assert cv2.imread(str(picture)).shape[0] > 500
+
+
+def test_without_propose_the_mapping_is_shown_and_nothing_written(german, tmp_path):
+    before = sorted(tmp_path.iterdir())
+    done = run("log", "check", german)
+    assert done.exit_code == 1
+    assert 'wheel_speed_rl_rad_s: {column: "Drehzahl HL [1/min]"} # in 1/min' in words(done.output)
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_the_python_package_uses_no_proposal_by_itself(german):
+    with pytest.raises(trpac.TrpacError, match="required columns missing"):
+        trpac.read_log(german)
+
+
+def test_what_is_odd_is_told(frame, tmp_path):
+    frame.loc[10:14, "wheel_speed_fl_rad_s"] = 655.35
+    frame.loc[100, "time_s"] = frame.loc[99, "time_s"]
+    done = run("log", "check", save(frame, tmp_path / "log.csv"))
+    assert done.exit_code == 0
+    text = words(done.output)
+    assert "5 samples from row 12 on are 655.35" in text
+    assert "row 102 repeats the time above" in text
+    assert "wheel_speed_fl_rad_s 100 2.0%" in text
+
+
+@pytest.mark.parametrize(
+    ("content", "said"), [(None, "No such file"), (b"", "is empty"), (b"PAR1", "cannot be read as Parquet")]
+)
+def test_what_cannot_be_read(tmp_path, content, said):
+    path = tmp_path / "log.csv" if content != b"PAR1" else tmp_path / "log.parquet"
+    if content is not None:
+        path.write_bytes(content)
+    done = run("log", "check", path, "--picture", tmp_path / "a.png", "--propose", tmp_path / "map.yaml")
+    assert done.exit_code == 2
+    assert said in done.stderr
+    assert not (tmp_path / "a.png").exists()
+    assert not (tmp_path / "map.yaml").exists()

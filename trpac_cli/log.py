@@ -1,0 +1,149 @@
+"""The command `trpac log check`: how a recorded log is understood."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from trpac_cli.console import Terminal, bars, refuse, require_folder
+
+if TYPE_CHECKING:
+    from sim2real.logs.inspection import ColumnReport
+    from sim2real.logs.read import Understood
+
+COMMAND = "trpac log check"
+EXIT_NOT_ENOUGH = 1
+"""Exit code of a file that can be read and does not hold what an estimate needs."""
+
+app = typer.Typer(help="Recorded logs: what a file holds, and how it is understood.", no_args_is_help=True)
+
+
+@app.callback()
+def _group() -> None:
+    """Commands on recorded logs."""
+
+
+@app.command()
+def check(
+    log: Annotated[Path, typer.Argument(help="Recorded drive: a table (CSV and kin), Parquet, MDF.")],
+    mapping: Annotated[
+        Path | None,
+        typer.Option("--map", help="How its columns and units become the log format's: mapping.yaml."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Write the log in the log format's names and units: .parquet, .csv or .mf4."),
+    ] = None,
+    picture: Annotated[Path | None, typer.Option(help="Write a picture of its signals: .png.")] = None,
+    propose: Annotated[
+        Path | None,
+        typer.Option(help="Write a mapping file to correct by hand, by the columns' names and units: .yaml."),
+    ] = None,
+) -> None:
+    """Show how a log is understood: each column's source, unit and range, what was mended, what is missing.
+
+    Where columns have other names than the log format's, a mapping file is
+    proposed; nothing of it is used before you give it with --map.
+
+    Example: trpac log check drive.csv --propose map.yaml --picture drive.png,
+    then, with map.yaml corrected:
+    trpac log check drive.csv --map map.yaml --out drive.parquet
+
+    Names, units and mapping files: docs/logs.md.
+
+    Exit codes: 0 fit for use, 1 readable but not enough, 2 not readable, and then nothing is written.
+    """
+    from scenarios.whole_files import write_whole, written_whole
+    from sim2real.logs.inspection import draw, missing_for_diagnosis, missing_for_estimate
+    from sim2real.logs.mapping import load_mapping
+    from sim2real.logs.proposal import candidates, proposed_mapping
+    from sim2real.logs.read import understood
+    from sim2real.logs.write import write_log
+    from trpac_core.errors import TrpacError
+    from trpac_core.files import file_sha256
+
+    for path in (out, picture, propose):
+        if path is not None:
+            require_folder(COMMAND, path.parent)
+    try:
+        size = log.stat().st_size if log.is_file() else 0
+        with bars() as progress:
+            found = understood(
+                log,
+                load_mapping(mapping) if mapping else None,
+                progress=lambda done: progress("reading [kB]", done // 1000, max(1, size // 1000)),
+            )
+    except (TrpacError, OSError) as error:
+        refuse(COMMAND, error)
+    console = Terminal()
+    console.print(
+        f"{log.name}: {len(found.time_s)} rows, read as: {'; '.join(found.table.notes) or 'the plain form'}"
+    )
+    _show(console, found)
+    for text in found.problems:
+        console.print(text, style="red")
+    for text in found.warnings:
+        console.print(text, style="yellow")
+    lacks = missing_for_estimate(found)
+    fit = not found.problems and not lacks
+    usable = "usable" if fit else "not usable, see above"
+    console.print(f"For trpac estimate: {usable}.")
+    if fit:
+        console.print(f"For trpac gap diagnose: {'; '.join(missing_for_diagnosis(found)) or 'usable'}.")
+    try:
+        written = []
+        if picture is not None:
+            draw(found, picture)
+            written.append(picture)
+        if propose is not None:
+            write_whole(propose, proposed_mapping(found.table, log.name).encode())
+            written.append(propose)
+        if out is not None and fit:
+            with written_whole(out.parent) as scratch:
+                write_log(found.log(lambda: file_sha256(log)), scratch / out.name)
+            written.append(out)
+    except (TrpacError, OSError) as error:
+        refuse(COMMAND, error)
+    if propose is None and lacks and candidates(found.table):
+        console.print(
+            "\nA mapping file to correct by hand and to give with --map (--propose FILE writes it):\n"
+        )
+        console.print(proposed_mapping(found.table, log.name), soft_wrap=True)
+    if written:
+        console.print("  ".join(str(path) for path in written), soft_wrap=True)
+    if not fit:
+        if out is not None:
+            console.print(f"{out} was not written: the log lacks what stands above.", style="red")
+        raise typer.Exit(EXIT_NOT_ENOUGH)
+
+
+def _show(console: Terminal, found: Understood) -> None:
+    from sim2real.logs.inspection import column_reports
+
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for heading in ("column", "source", "unit", "factor", "rate [Hz]", "lost", "least", "greatest"):
+        left = heading in ("column", "source", "unit")
+        table.add_column(
+            heading, justify="left" if left else "right", no_wrap=heading != "source", overflow="fold"
+        )
+    for column in column_reports(found):
+        table.add_row(*_row(column))
+    console.print(table)
+
+
+def _row(column: ColumnReport) -> tuple[str, ...]:
+    return (
+        column.name,
+        "" if column.source == column.name else column.source,
+        column.unit,
+        "" if math.isnan(column.factor) or column.factor == 1.0 else f"{column.factor:.6g}",
+        f"{column.rate_hz:.4g}",
+        f"{column.lost:.1%}" if column.lost else "",
+        f"{column.low:.5g}",
+        f"{column.high:.5g}",
+    )
