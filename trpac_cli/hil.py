@@ -155,7 +155,7 @@ def hil(
     from trpac_hil.settings import HilSettings
     from trpac_hil.unit import WHEELS
 
-    _quiet_libraries()
+    _silence_libraries()
     require_folder(COMMAND, out)
     if wheel not in WHEELS:
         refuse(COMMAND, f"--wheel {wheel}: expected {', '.join(WHEELS)}.")
@@ -232,7 +232,7 @@ def hil_plant(
     from trpac_hil.plant_node import open_plant_node
     from trpac_hil.rig import RUN_UP_NS, Stopper
 
-    _quiet_libraries()
+    _silence_libraries()
     try:
         job = _plant_job(_bus(interface, channel, bus_option), dbc, signals, scenario, rate_hz, True)
         job = replace(job, camera_fps=camera_fps, camera_delay_s=camera_delay_s)
@@ -251,7 +251,7 @@ def hil_plant(
     print(f"{PLANT_COMMAND}: {node.left_out} cycles were left out for being late.", file=sys.stderr)
 
 
-def _quiet_libraries() -> None:
+def _silence_libraries() -> None:
     """Keep warnings of the libraries off the terminal: what is wrong is said by this command, once."""
     for library in ("can", "cantools"):
         logging.getLogger(library).setLevel(logging.ERROR)
