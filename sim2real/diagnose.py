@@ -48,6 +48,7 @@ def diagnose_files(
     holdout: str,
     *,
     mapping: Path | None = None,
+    dbc: Sequence[Path] = (),
     paired: Sequence[str] = (),
     simulated: Sequence[str] = (),
     by: By = "time",
@@ -69,6 +70,8 @@ def diagnose_files(
         Logs that parameters are fitted to, and the one that the gap is measured on; `log.csv` or `log.csv@road.yaml`.
     mapping : Path, optional
         How the logs' columns become the contract's.
+    dbc : sequence of Path
+        DBC files that say what the frames of a bus mean.
     paired : sequence of str
         Reference logs: the same manoeuvres without the fault, one for each fit log and, last, the hold-out's. What the
         simulation leaves of them is no gap.
@@ -99,7 +102,7 @@ def diagnose_files(
     progress("reading", 0, 1)
     pairing = pairing_of(paired, simulated, by)
     require_alone(model, signals, pairing)
-    sources = read_sources(vehicle, road, fit, holdout, mapping, pairing, baseline)
+    sources = read_sources(vehicle, road, fit, holdout, mapping, pairing, baseline, dbc)
     progress("reading", 1, 1)
     if model is None or signals is None:
         return diagnose_sources(sources, seed=seed, exclude=exclude, jobs=jobs, progress=progress)

@@ -129,6 +129,7 @@ def read_sources(
     mapping: Path | None = None,
     pairing: Pairing | None = None,
     baseline: Sequence[str] = (),
+    dbc: Sequence[Path] = (),
 ) -> Sources:
     """Read everything, all problems of all files in one error.
 
@@ -144,6 +145,8 @@ def read_sources(
         Reference logs; on the road of their log where they name none.
     baseline : sequence of str
         Logs of the same car without the suspected fault.
+    dbc : sequence of Path
+        DBC files that say what the frames of a bus mean.
 
     Raises
     ------
@@ -173,12 +176,12 @@ def read_sources(
     wanted = [*((text, found) for text in (*fit, holdout)), *((text, faultless) for text in baseline)]
     for text, into in wanted:
         try:
-            into.append(read_source(text, road, columns))
+            into.append(read_source(text, road, columns, dbc))
         except ScenarioError as error:
             problems.append(str(error))
     for text, log in zip(pairing.logs if pairing else (), (*fit, holdout), strict=False):
         try:
-            references.append(read_source(text, _road_of(log, road), columns))
+            references.append(read_source(text, _road_of(log, road), columns, dbc))
         except ScenarioError as error:
             problems.append(str(error))
     if problems or car is None:
@@ -272,7 +275,9 @@ def told_apart(sources: Sequence[Source]) -> list[Source]:
     return [named(s, name) for s, name in zip(sources, numbered, strict=True)]
 
 
-def read_source(text: str, road: Path | None, columns: Mapping | None = None) -> Source:
+def read_source(
+    text: str, road: Path | None, columns: Mapping | None = None, dbc: Sequence[Path] = ()
+) -> Source:
     """Read one log, `log.csv` or `log.csv@road.yaml`, and its road; raises ScenarioError with all problems of both."""
     log_path, road_path = split(text, road)
     problems: list[str] = []
@@ -282,7 +287,7 @@ def read_source(text: str, road: Path | None, columns: Mapping | None = None) ->
     except ScenarioError as error:
         problems.append(str(error))
     try:
-        log = read_log(log_path, columns)
+        log = read_log(log_path, columns, dbc)
     except ScenarioError as error:
         problems.append(str(error))
     if course is None or log is None:

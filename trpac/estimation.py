@@ -16,6 +16,7 @@ from scenarios.library import located
 from scenarios.progress import StageProgress, silent
 from sim2real.logs import Log
 from sim2real.logs.mapping import Mapping
+from sim2real.logs.read import DbcFiles
 from sim2real.replay.estimate import TABLE_3, estimate_log
 from sim2real.replay.run import Replay
 from trpac.extras import extras
@@ -85,6 +86,7 @@ def estimate(
     vehicle: VehicleFile | str | Path | None = None,
     *,
     mapping: Mapping | str | Path | None = None,
+    dbc: DbcFiles = None,
     camera: str | Path | None = None,
     peers: bool = False,
     method: str = "robust",
@@ -100,6 +102,8 @@ def estimate(
         The car; by default that of the paper (Table 3), with a warning.
     mapping, camera : path, optional
         Columns of the log in the log format; the camera of the pictures in column image_path.
+    dbc : path or sequence of paths, optional
+        DBC files that say what the frames of a bus mean.
     peers : bool
         Whether to run estimators of the literature as well.
     method : str
@@ -120,7 +124,7 @@ def estimate(
     progress("reading", 0, 1)
     origin = TABLE_3 if vehicle is None else vehicle
     car, lens = as_vehicle(origin), None if camera is None else load_camera(camera)
-    read = read_log(log, mapping=mapping)
+    read = read_log(log, mapping=mapping, dbc=dbc)
     progress("reading", 1, 1)
     with extras("estimate"):
         replay, summary = estimate_log(

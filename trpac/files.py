@@ -13,11 +13,17 @@ from scenarios.strict import load_strict
 from sim2real.logs import Log, load_mapping, log_of_frame
 from sim2real.logs import read_log as _read_log
 from sim2real.logs.mapping import Mapping
+from sim2real.logs.read import DbcFiles
 from trpac.extras import extras
 
 
-def read_log(log: Log | pd.DataFrame | str | Path, *, mapping: Mapping | str | Path | None = None) -> Log:
-    """The log of a file (CSV, Parquet, MDF) or of a table in memory, in the names and units of the log format.
+def read_log(
+    log: Log | pd.DataFrame | str | Path,
+    *,
+    mapping: Mapping | str | Path | None = None,
+    dbc: DbcFiles = None,
+) -> Log:
+    """The log of a file or of a table in memory, in the names and units of the log format.
 
     Parameters
     ----------
@@ -25,6 +31,8 @@ def read_log(log: Log | pd.DataFrame | str | Path, *, mapping: Mapping | str | P
         A Log is returned unchanged.
     mapping : path, optional
         Its columns in the log format.
+    dbc : path or sequence of paths, optional
+        DBC files that say what the frames of a bus mean.
 
     Raises
     ------
@@ -35,7 +43,7 @@ def read_log(log: Log | pd.DataFrame | str | Path, *, mapping: Mapping | str | P
         return log
     columns = mapping if mapping is None or isinstance(mapping, Mapping) else load_mapping(mapping)
     with extras("read_log"):
-        return log_of_frame(log, columns) if isinstance(log, pd.DataFrame) else _read_log(log, columns)
+        return log_of_frame(log, columns) if isinstance(log, pd.DataFrame) else _read_log(log, columns, dbc)
 
 
 def list_effects() -> pd.DataFrame:

@@ -15,6 +15,7 @@ from scenarios.files import RoadFile, VehicleFile
 from scenarios.progress import StageProgress, silent
 from sim2real.logs import Log
 from sim2real.logs.mapping import Mapping
+from sim2real.logs.read import DbcFiles
 from sim2real.result import Budget, Cause, Gap, Place, Verdict, needed
 from sim2real.result import Diagnosis as Result
 from trpac.extras import extras
@@ -110,6 +111,7 @@ def diagnose(
     fit: Sequence[AnyLog],
     holdout: AnyLog,
     mapping: Mapping | str | Path | None = None,
+    dbc: DbcFiles = None,
     baseline: Sequence[AnyLog] = (),
     paired: Sequence[AnyLog] = (),
     simulated: Sequence[AnyLog] = (),
@@ -131,6 +133,8 @@ def diagnose(
         DataFrames or paths: logs for the fit of parameters, and the log on which the gap is measured.
     mapping : path, optional
         Columns of the logs in the log format.
+    dbc : path or sequence of paths, optional
+        DBC files that say what the frames of a bus mean.
     baseline : sequence of logs
         Logs of the same car without the suspected fault, of any manoeuvre.
     paired : sequence of logs
@@ -160,7 +164,7 @@ def diagnose(
         Without the extra 'gap'.
     """
     car, course = as_vehicle(vehicle), as_road(road)
-    logs = [read_log(log, mapping=mapping) for log in (*fit, holdout)]
+    logs = [read_log(log, mapping=mapping, dbc=dbc) for log in (*fit, holdout)]
     with extras("diagnose", "gap"):
         from sim2real.diagnose import diagnose_sources
         from sim2real.own_sources import require_alone, studied
@@ -170,8 +174,8 @@ def diagnose(
         require_alone(model, signals, pairing)
         if pairing:
             pairing.require(len(logs))
-        references = [read_log(log, mapping=mapping) for log in pairing.logs] if pairing else []
-        faultless = [make_source(read_log(log, mapping=mapping), course) for log in baseline]
+        references = [read_log(log, mapping=mapping, dbc=dbc) for log in pairing.logs] if pairing else []
+        faultless = [make_source(read_log(log, mapping=mapping, dbc=dbc), course) for log in baseline]
         sources = put_together(
             car,
             None,

@@ -15,7 +15,7 @@ COMMAND = "trpac estimate"
 
 
 def estimate(
-    log: Annotated[Path, typer.Argument(help="Recorded drive: CSV, Parquet or MDF4.")],
+    log: Annotated[Path, typer.Argument(help="Recorded drive: a table, MDF, MAT-file or bus log.")],
     out: Annotated[Path, typer.Option(help="Folder for estimates.csv, report.html and summary.json.")],
     vehicle: Annotated[
         Path | None,
@@ -30,6 +30,10 @@ def estimate(
     mapping: Annotated[
         Path | None,
         typer.Option("--map", help="How the log's columns and units become the contract's: mapping.yaml."),
+    ] = None,
+    dbc: Annotated[
+        list[Path] | None,
+        typer.Option(help="What the frames of a bus log mean: car.dbc; may be repeated."),
     ] = None,
     peers: Annotated[
         bool,
@@ -53,6 +57,9 @@ def estimate(
     Example: trpac estimate drive.mf4 --vehicle car.yaml --map mapping.yaml
     --out out/drive
 
+    A raw log of the bus (BLF, ASC, candump, TRC, MDF) needs --dbc car.dbc;
+    its columns are named Message.Signal.
+
     Ready-made mapping files lie in sim2real/mappings, formats in docs/logs.md,
     how to read the result in docs/estimate.md.
 
@@ -64,7 +71,14 @@ def estimate(
     try:
         with bars() as progress:
             done = trpac.estimate(
-                log, vehicle, mapping=mapping, camera=camera, peers=peers, method=method, progress=progress
+                log,
+                vehicle,
+                mapping=mapping,
+                dbc=dbc,
+                camera=camera,
+                peers=peers,
+                method=method,
+                progress=progress,
             )
             progress("report", 0, 1)
             written = done.write(out)

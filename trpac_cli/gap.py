@@ -52,7 +52,9 @@ def diagnose(
     vehicle: Annotated[Path, typer.Option(help="What the simulation knows of the car: vehicle.yaml.")],
     fit: Annotated[
         list[str],
-        typer.Option(help="Log to fit to (CSV, Parquet, MDF4), LOG or LOG@ROAD.yaml; may be repeated."),
+        typer.Option(
+            help="Log to fit to (table, MDF, MAT-file, bus log), LOG or LOG@ROAD.yaml; may be repeated."
+        ),
     ],
     holdout: Annotated[
         str,
@@ -65,6 +67,10 @@ def diagnose(
     mapping: Annotated[
         Path | None,
         typer.Option("--map", help="How the logs' columns and units become the contract's: mapping.yaml."),
+    ] = None,
+    dbc: Annotated[
+        list[Path] | None,
+        typer.Option(help="What the frames of bus logs mean: car.dbc; may be repeated."),
     ] = None,
     baseline: Annotated[
         list[str] | None,
@@ -157,6 +163,7 @@ def diagnose(
                 fit,
                 holdout,
                 mapping=mapping,
+                dbc=dbc or (),
                 baseline=baseline or (),
                 paired=paired or (),
                 simulated=simulated or (),

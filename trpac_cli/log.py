@@ -30,10 +30,17 @@ def _group() -> None:
 
 @app.command()
 def check(
-    log: Annotated[Path, typer.Argument(help="Recorded drive: a table (CSV and kin), Parquet, MDF.")],
+    log: Annotated[
+        Path,
+        typer.Argument(help="Recorded drive: a table (CSV and kin), Parquet, MDF, MAT or a raw bus log."),
+    ],
     mapping: Annotated[
         Path | None,
         typer.Option("--map", help="How its columns and units become the log format's: mapping.yaml."),
+    ] = None,
+    dbc: Annotated[
+        list[Path] | None,
+        typer.Option(help="DBC file of a raw bus log (BLF, ASC, candump, TRC, MDF); may be repeated."),
     ] = None,
     out: Annotated[
         Path | None,
@@ -76,6 +83,7 @@ def check(
             found = understood(
                 log,
                 load_mapping(mapping) if mapping else None,
+                dbc,
                 progress=lambda done: progress("reading [kB]", done // 1000, max(1, size // 1000)),
             )
     except (TrpacError, OSError) as error:

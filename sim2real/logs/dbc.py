@@ -10,7 +10,7 @@ import cantools
 from cantools.database.can import Database, Signal
 
 from sim2real.logs.errors import LogError
-from trpac_core.files import FileError, quoted, read_text
+from trpac_core.files import FileError, quoted, read_bytes
 
 MOST_BYTES = 16_000_000
 """Largest DBC file that is read [bytes]; files of a whole car have some megabytes."""
@@ -52,7 +52,7 @@ _NO_VALUE = re.compile(
 def load_dbc(path: str | Path) -> Database:
     """The database of a DBC file; raises LogError where it is missing, damaged or too large."""
     try:
-        text = read_text(path, MOST_BYTES, "a DBC file")
+        text = _text(read_bytes(path, MOST_BYTES, "a DBC file"))
         _require_sizes(text)
         return cantools.database.load_string(_without_orphans(text), "dbc")  # type: ignore[return-value]
     except FileError as error:
@@ -69,6 +69,14 @@ def _without_orphans(text: str) -> str:
         message = number or message
         signals.setdefault(message, set()).add(name)
     return _VALUE_TABLE.sub(lambda found: found[0] if found[2] in signals.get(found[1], ()) else "", text)
+
+
+def _text(data: bytes) -> str:
+    """UTF-8, or the encoding that the format's first tools write: cp1252."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")
 
 
 def no_value(signal: Signal) -> frozenset[float]:

@@ -1,34 +1,19 @@
-"""Takes single channels out of an MDF file; run as a program of its own by `sim2real.logs.mdf_file`.
+"""The channels of an MDF file, and its raw frames of a bus; a reader of `sim2real.logs.extractor`.
 
-asammdf reads block addresses and record sizes from the file and trusts them: on damaged files it raises anything,
-prints tracebacks of its own, unpacks without end, and can crash the interpreter. In a process of its own, whose memory
-is bounded and which ends with its parent, that is one clean error.
-
-It also hands a channel's conversion formula, text of the file's, to numexpr and SymPy, which run it as Python. So
+asammdf hands a channel's conversion formula, text of the file's, to numexpr and SymPy, which run it as Python. So
 neither is there: in their place stands `sim2real.logs.formula`, which is arithmetic alone.
-
-It reads JSON, path and names, from standard input and writes arrays by name (npz) to standard output, in which
-"told" is JSON. Whatever a library prints goes to standard error. Nothing of ours is imported as a package, so that it
-starts fast.
 """
 
 from __future__ import annotations
 
-import ctypes
 import importlib.util
-import json
-import os
-import signal
 import sys
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from io import BufferedReader, BytesIO
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NoReturn
-
-DEATH_OF_PARENT = 1
-"""Linux's number of the wish to get a signal when the parent ends: PR_SET_PDEATHSIG."""
 
 
 def load_formulas() -> ModuleType:
@@ -68,12 +53,6 @@ def replace_evaluators() -> None:
         sys.modules[name] = module
 
 
-if __name__ == "__main__":
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(DEATH_OF_PARENT, signal.SIGKILL)
-    answer = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
-
 replace_evaluators()
 
 import numpy as np  # noqa: E402
@@ -81,51 +60,129 @@ from asammdf import MDF, Signal  # noqa: E402
 
 UNFINISHED = b"UnFinMF"
 """Start of an MDF that its recorder did not close."""
+FRAME = "CAN_DataFrame"
+"""Name of a channel that holds raw frames, after the standard for bus logging; its parts are NAME.ID and so on."""
+EXTENDED, ID_BITS = 1 << 31, (1 << 29) - 1
+"""Bit of an ID that says that it has 29 bits, and those bits."""
+CHUNK = 100_000
+"""Raw frames that are looked at together; each takes about 100 bytes."""
+MOST_SEEN = 5_000
+"""IDs that are told, those with the most frames."""
 
 
-def bound_memory(most_bytes: int) -> None:
-    """Let this process take so much more than it has now, where the system can tell; what needs more is refused."""
-    if sys.platform == "linux":
-        import resource
+def extract(order: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What JSON says of the file, and arrays by name.
 
-        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[5])
-        limit = pages * resource.getpagesize() + most_bytes
-        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
+    The order has the path, the wanted channels, and the (ID, is extended) of wanted frames. Told are the names of all
+    channels, the masters, the wanted channels, and whether there are raw frames, with the wanted ones. A channel name
+    that several groups have becomes NAME#GROUP.
 
-
-def extract(path: Path, wanted: Collection[str], most_numbers: int) -> dict[str, Any]:
-    """Arrays by name: "told" (JSON: names of all channels, masters, wanted channels), and each one's samples.
-
-    A channel name that several groups have becomes NAME#GROUP. Raises ValueError where the wanted channels hold more
-    than `most_numbers` samples.
+    Raises
+    ------
+    ValueError
+        The wanted channels hold more than `most_numbers` samples.
     """
-    with _open(path) as stream, MDF(stream) as mdf:
-        groups: list[Any] = list(mdf.groups)
-        every = [
-            (str(channel.name), g, i)
-            for g, group in enumerate(groups)
-            for i, channel in enumerate(group.channels)
-            if i != mdf.masters_db.get(g)
-        ]
-        count = Counter(name for name, _, _ in every)
-        places = {name if count[name] == 1 else f"{name}#{g}": (g, i) for name, g, i in every}
-        found = [name for name in places if name in wanted]
-        numbers = sum(int(groups[places[name][0]].channel_group.cycles_nr) for name in found)
-        if numbers > most_numbers:
-            raise ValueError(
-                f"{numbers} samples in the channels that are read; expected at most {most_numbers}"
-            )
-        signals = mdf.select([(None, *places[name]) for name in found], ignore_value2text_conversions=True)
-        arrays: dict[str, Any] = {}
-        channels = {
+    arrays: dict[str, Any] = {}
+    with _open(Path(order["path"])) as stream, MDF(stream) as mdf:
+        told = _channels(mdf, frozenset(order["wanted"]), order["most_numbers"], arrays)
+        told["bus"] = any(channel.name == FRAME for group in mdf.groups for channel in group.channels)
+        if told["bus"] and order.get("frames") is not None:
+            kept = {(int(i), bool(x)) for i, x in order["frames"]}
+            told |= _frames(mdf, kept, order["most_numbers"], arrays)
+        told["epoch_s"] = mdf.header.start_time.timestamp()
+    return told, arrays
+
+
+def _channels(mdf: MDF, wanted: Collection[str], most_numbers: int, arrays: dict[str, Any]) -> dict[str, Any]:
+    groups: list[Any] = list(mdf.groups)
+    every = [
+        (str(channel.name), g, i)
+        for g, group in enumerate(groups)
+        for i, channel in enumerate(group.channels)
+        if i != mdf.masters_db.get(g)
+    ]
+    count = Counter(name for name, _, _ in every)
+    places = {name if count[name] == 1 else f"{name}#{g}": (g, i) for name, g, i in every}
+    found = [name for name in places if name in wanted]
+    numbers = sum(int(groups[places[name][0]].channel_group.cycles_nr) for name in found)
+    if numbers > most_numbers:
+        raise ValueError(f"{numbers} samples in the channels that are read; expected at most {most_numbers}")
+    signals = mdf.select([(None, *places[name]) for name in found], ignore_value2text_conversions=True)
+    return {
+        "names": list(places),
+        "masters": [str(groups[g].channels[i].name) for g, i in mdf.masters_db.items()],
+        "channels": {
             name: _told(str(k), s, arrays) for k, (name, s) in enumerate(zip(found, signals, strict=True))
-        }
-        told = {
-            "names": list(places),
-            "masters": [str(groups[g].channels[i].name) for g, i in mdf.masters_db.items()],
-            "channels": channels,
-        }
-        return {**arrays, "told": np.frombuffer(json.dumps(told).encode(), np.uint8)}
+        },
+    }
+
+
+def _frames(
+    mdf: MDF, kept: Collection[tuple[int, bool]], most_numbers: int, arrays: dict[str, Any]
+) -> dict[str, Any]:
+    """The frames with these IDs, as `bus_frames` tells of them."""
+    found: dict[tuple[int, ...], list[tuple[Any, Any, Any]]] = {}
+    seen: Counter[tuple[int, bool]] = Counter()
+    first_s = np.inf
+    for time_s, kinds, lengths, data in _chunks(mdf, most_numbers):
+        first_s = min(first_s, float(time_s.min()))
+        keys, which = np.unique(kinds, axis=0, return_inverse=True)
+        for k, key in enumerate(keys.tolist()):
+            rows = np.flatnonzero(which.ravel() == k)
+            kind = (key[0], bool(key[1]))
+            seen[kind] += len(rows)
+            if kind in kept:
+                there = np.arange(data.shape[1]) < lengths[rows, None]
+                part = time_s[rows], lengths[rows].astype(np.uint8), data[rows][there]
+                found.setdefault(tuple(key), []).append(part)
+    for k, parts in enumerate(found.values()):
+        for name, content in zip(("time", "length", "data"), zip(*parts, strict=True), strict=True):
+            arrays[f"{name}_f{k}"] = np.concatenate(content)
+    return {
+        "frames": [
+            {"id": number, "extended": bool(extended), "channel": str(channel), "key": f"f{k}"}
+            for k, (number, extended, channel, _) in enumerate(found)
+        ],
+        "seen": [[*key, n] for key, n in seen.most_common(MOST_SEEN)],
+        "count": seen.total(),
+        "first_s": first_s if seen else 0.0,
+    }
+
+
+def _chunks(mdf: MDF, most_numbers: int) -> Iterator[tuple[Any, Any, Any, Any]]:
+    """Of CHUNK raw frames at a time: times [s]; ID, is extended, channel, group; lengths; bytes, (frames, longest)."""
+    for g, group in enumerate(list[Any](mdf.groups)):
+        parts = {str(channel.name): i for i, channel in enumerate(group.channels)}
+        count = group.channel_group.cycles_nr
+        if FRAME not in parts or not count:
+            continue
+        if count > most_numbers:
+            raise ValueError(f"{count} frames; expected at most {most_numbers}")
+        missing = [name for name in ("ID", "DataBytes") if f"{FRAME}.{name}" not in parts]
+        if missing:
+            raise ValueError(f"raw frames in group {g} without {FRAME}.{missing[0]}")
+        for offset in range(0, count, CHUNK):
+            there = {
+                name: mdf.get(group=g, index=parts[full], raw=True, record_offset=offset, record_count=CHUNK)
+                for name in ("ID", "IDE", "BusChannel", "DataLength", "DataBytes")
+                if (full := f"{FRAME}.{name}") in parts
+            }
+            ids = there["ID"].samples.astype(np.int64)
+            data = _as_bytes(there["DataBytes"].samples)
+            none, full_length = np.zeros(len(ids), np.int64), np.full(len(ids), data.shape[1])
+            extended = there["IDE"].samples.astype(bool) if "IDE" in there else ids & EXTENDED != 0
+            channel = there["BusChannel"].samples.astype(np.int64) if "BusChannel" in there else none
+            lengths = there["DataLength"].samples.astype(np.int64) if "DataLength" in there else full_length
+            kinds = np.column_stack((ids & ID_BITS, extended, channel, none + g))
+            yield there["ID"].timestamps, kinds, np.minimum(lengths, full_length), data
+
+
+def _as_bytes(samples: Any) -> Any:
+    """Payloads as an array of bytes, shape (frames, longest)."""
+    samples = np.ascontiguousarray(samples)
+    if samples.dtype.kind == "S" or samples.ndim == 1:
+        return samples.view(np.uint8).reshape(len(samples), -1)
+    return samples.astype(np.uint8)
 
 
 def _told(key: str, signal: Signal, arrays: dict[str, Any]) -> dict[str, Any]:
@@ -155,15 +212,3 @@ def _open(path: Path) -> BufferedReader | BytesIO:
             return BytesIO(file.read())
     file.seek(0)
     return file
-
-
-if __name__ == "__main__":
-    order = json.load(sys.stdin)
-    bound_memory(order["most_bytes"])
-    try:
-        content = extract(Path(order["path"]), frozenset(order["wanted"]), order["most_numbers"])
-    except Exception as error:  # noqa: BLE001 - asammdf raises anything on a damaged file
-        reason = " ".join(str(error).split())[:300] if isinstance(error, ValueError) else type(error).__name__
-        content = {"told": np.frombuffer(json.dumps({"refused": reason}).encode(), np.uint8)}
-    np.savez(answer, **content)
-    answer.close()

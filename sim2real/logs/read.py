@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +14,11 @@ from sim2real.logs.checks import Clock, check_held, check_time, check_values
 from sim2real.logs.csv_file import read_csv
 from sim2real.logs.errors import LogError
 from sim2real.logs.frame_table import frame_sha256, frame_table
+from sim2real.logs.kinds import KINDS, kind_of
 from sim2real.logs.log import Log
 from sim2real.logs.mapping import NO_MAPPING, Mapping
-from sim2real.logs.mdf_file import read_mdf
+from sim2real.logs.mat_file import read_mat
+from sim2real.logs.mdf_file import needs_dbc, read_mdf
 from sim2real.logs.parquet_file import read_parquet
 from sim2real.logs.plausible import lost_samples, without_codes, without_stuck_codes
 from sim2real.logs.resampling import median_step
@@ -38,13 +40,29 @@ LONGEST_FINDING = 600
 """Characters of one sentence about a log."""
 MAGIC = {b"PAR1": "Parquet", b"MDF ": "MDF", b"UnFi": "MDF"}
 """First four bytes of the files that are not text; UnFi is an MDF that its recorder did not close."""
-SUFFIXES = {".csv": "CSV", ".parquet": "Parquet", ".mf4": "MDF", ".mdf": "MDF", ".dat": "MDF"}
+SUFFIXES = {".csv": "CSV", ".parquet": "Parquet", ".mf4": "MDF", ".mdf": "MDF", ".dat": "MDF"} | {
+    ".blf": "BLF",
+    ".trc": "TRC",
+    ".mat": "MAT",
+}
+BUS_SUFFIXES = {".asc": "ASC", ".log": "candump"}
+"""Names that tables have, too: with a DBC file they must be bus logs."""
+START_BYTES = 4096
+"""So many bytes tell what a file is."""
+
+
+DbcFiles = str | Path | Sequence[str | Path] | None
+"""One or several DBC files."""
 
 
 def read_log(
-    path: str | Path, mapping: Mapping | None = None, *, progress: Callable[[int], None] = lambda _: None
+    path: str | Path,
+    mapping: Mapping | None = None,
+    dbc: DbcFiles = None,
+    *,
+    progress: Callable[[int], None] = lambda _: None,
 ) -> Log:
-    """Read a log strictly: CSV, Parquet or MDF, told apart by their content.
+    """Read a log strictly: a table, MDF, a MAT-file, or raw frames of a bus, told apart by their content.
 
     Parameters
     ----------
@@ -52,6 +70,8 @@ def read_log(
         The file.
     mapping : Mapping, optional
         How its columns become those of the log format; columns that it does not name are read under their own names.
+    dbc : path or sequence of paths, optional
+        DBC files that say what the frames of a bus mean: needed for BLF, ASC, candump, TRC, and MDF with raw frames.
     progress : callable
         Called with the bytes of a text table that were read so far.
 
@@ -61,11 +81,15 @@ def read_log(
         With all problems of the file, one a line.
     """
     path = Path(path)
-    return understood(path, mapping, progress=progress).log(lambda: file_sha256(path))
+    return understood(path, mapping, dbc, progress=progress).log(lambda: file_sha256(path))
 
 
 def understood(
-    path: str | Path, mapping: Mapping | None = None, *, progress: Callable[[int], None] = lambda _: None
+    path: str | Path,
+    mapping: Mapping | None = None,
+    dbc: DbcFiles = None,
+    *,
+    progress: Callable[[int], None] = lambda _: None,
 ) -> Understood:
     """What a file is understood to hold, usable or not; parameters as of `read_log`.
 
@@ -75,8 +99,9 @@ def understood(
         It cannot be read at all.
     """
     path, mapping = Path(path), mapping or NO_MAPPING
+    files = [dbc] if isinstance(dbc, str | Path) else list(dbc or ())
     try:
-        row_word, table = _read_table(path, mapping, progress)
+        row_word, table = _read_table(path, mapping, files, progress)
     except LogError:
         raise
     except (FileError, ValueError) as error:  # the latter of text that is no picture's path
@@ -199,19 +224,42 @@ def _understand(table: Table, mapping: Mapping, path: Path, row_word: str) -> Un
     return Understood(path, mapping, table, time_s, signals, made.derived, clock.gaps, tuple(findings))
 
 
-def _read_table(path: Path, mapping: Mapping, progress: Callable[[int], None]) -> tuple[str, Table]:
+def _read_table(
+    path: Path, mapping: Mapping, dbc: Sequence[str | Path], progress: Callable[[int], None]
+) -> tuple[str, Table]:
     """The file's columns, and what one of its rows is called; the content tells the format, the name must agree."""
     wanted = wanted_columns(mapping)
     with open_file(path, MOST_BYTES, "a log") as file:
-        start = file.read(4)
-    kind = MAGIC.get(start, "CSV")
-    named = SUFFIXES.get(path.suffix.lower(), kind)
+        start = file.read(START_BYTES)
+    kind = MAGIC.get(start[:4]) or kind_of(start) or "CSV"
+    suffix = path.suffix.lower()
+    named = SUFFIXES.get(suffix) or (BUS_SUFFIXES.get(suffix) if dbc and kind == "CSV" else None) or kind
     if kind != named:
         raise LogError(
             f"{path}: is named like {named} and does not start like it; expected a whole {named} file."
         )
+    if kind in KINDS or (kind == "MDF" and dbc):
+        if not dbc:
+            raise needs_dbc(path, kind)
+        from sim2real.logs.bus_file import read_bus  # cantools is an extra
+
+        return "sample", read_bus(path, kind, wanted, dbc)
+    row_word, table = _read_named(path, kind, mapping, progress)
+    if dbc:
+        told = Finding(f"is a {kind} file, whose columns have names: the DBC file is not used.", fatal=False)
+        table = replace(table, findings=(*table.findings, told))
+    return row_word, table
+
+
+def _read_named(
+    path: Path, kind: str, mapping: Mapping, progress: Callable[[int], None]
+) -> tuple[str, Table]:
+    """The columns of a file that names them."""
+    wanted = wanted_columns(mapping)
     if kind == "Parquet":
         return "row", read_parquet(path, wanted)
     if kind == "MDF":
         return "sample", read_mdf(path, wanted)
+    if kind == "MAT":
+        return "sample", read_mat(path, wanted)
     return "row", read_csv(path, wanted, mapping.format, progress)

@@ -28,9 +28,8 @@ def estimate(drive):
 @pytest.mark.parametrize("form", FORMS)
 def test_the_estimate_is_that_of_the_plain_form(drive, estimate, tmp_path, form):
     made = FORMS[form](drive, tmp_path)
-    read = trpac.read_log(made.path, mapping=made.mapping)
-    assert read.warnings == ()
-    found = trpac.estimate(made.path, CAR, mapping=made.mapping).frame
+    assert trpac.read_log(made.path, mapping=made.mapping, dbc=made.dbc).warnings == ()
+    found = trpac.estimate(made.path, CAR, mapping=made.mapping, dbc=made.dbc).frame
     assert np.abs(estimate["TRPAC"].max() - estimate["TRPAC"].min()) > 0.05
     for name in ("TRPAC", "TRPAC_std"):
         assert np.nanmax(np.abs(found[name].to_numpy() - estimate[name].to_numpy())) < TOLERANCE

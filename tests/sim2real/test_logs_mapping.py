@@ -195,6 +195,13 @@ class TestFileProblems:
             ("image_path: {column: a, scale: 2}", "image_path: holds text"),
             ("schema: 2\ntime_s: t", "schema: is 2;"),
             ("schema: 1", "maps nothing"),
+            ("format: {encoding: klingon}", "encoding: 'klingon' is not known; expected a name such as utf-8"),
+            ("format: {encoding: base64}", "encoding: 'base64' is not known"),
+            ("format: {separator: abc}", "separator: 'abc'; expected one character, or blanks"),
+            ("format: {decimal: ';'}", "format.decimal: is ';'"),
+            ("format: {header_row: 5, unit_row: 3}", "unit_row: expected a row below header_row"),
+            ("time: {column: t}\ntime_s: t", "time: stands beside time_s"),
+            ("invalid: {a: [x]}", "invalid.a[0]: is 'x'"),
             ("columns: {time_s: t}\nposition_m: x", "columns: stands beside position_m"),
             ("columns: 3", "columns: expected one line"),
             ("[1, 2]", "holds no keys at its top"),
@@ -240,8 +247,11 @@ class TestFileProblems:
 
 def test_the_document_is_true(mapping):
     page = (Path(__file__).parents[2] / "docs" / "logs.md").read_text(encoding="utf-8")
-    example = mapping(re.search(r"```yaml\n(.*?)```", page, re.DOTALL).group(1))
+    stated, example = (mapping(text) for text in re.findall(r"```yaml\n(.*?)```", page, re.DOTALL))
     assert len(example.columns) == 9
+    assert stated.format.encoding == "cp1252"
+    assert stated.time_form == "iso8601"
+    assert stated.invalid == {"*": (655.35,), "YawRate": (-4.096,)}
     for quantity, units in UNITS.items():
         assert f"| {quantity} | {', '.join(units)} |" in page
     for column in COLUMNS:

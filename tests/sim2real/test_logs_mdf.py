@@ -13,8 +13,8 @@ import pytest
 from asammdf import MDF, Signal
 from log_maker import make_frame
 
-from sim2real.logs import LogError, load_mapping, mdf_file, read_log, write_log
-from sim2real.logs.mdf_file import EXTRACTOR
+from sim2real.logs import LogError, extraction, load_mapping, mdf_file, read_log, write_log
+from sim2real.logs.extraction import EXTRACTOR
 from sim2real.logs.table import Wanted
 
 
@@ -202,8 +202,8 @@ def test_a_reader_that_crashes_or_hangs_is_one_too(tmp_path, monkeypatch, capfd,
     """Damaged sizes make asammdf do both."""
     write_log(frame, tmp_path / "log.mf4")
     (tmp_path / "reader.py").write_text(code)
-    monkeypatch.setattr(mdf_file, "EXTRACTOR", tmp_path / "reader.py")
-    monkeypatch.setattr(mdf_file, "LEAST_LIMIT_S", 1.0)
+    monkeypatch.setattr(extraction, "EXTRACTOR", tmp_path / "reader.py")
+    monkeypatch.setattr(extraction, "LEAST_LIMIT_S", 1.0)
     with pytest.raises(LogError, match=expected):
         read_log(tmp_path / "log.mf4")
     assert capfd.readouterr().err == ""
@@ -221,7 +221,8 @@ runpy.run_path(sys.argv[0], run_name="__main__")
 
 def test_what_a_library_prints_while_it_reads_is_no_part_of_the_answer(tmp_path, frame):
     path = save_groups(tmp_path / "log.mf4", signals(frame))
-    order = {"path": str(path), "wanted": ["accel_x_m_s2"], "most_numbers": 10**6, "most_bytes": 10**9}
+    order = {"reader": "mdf_channels", "path": str(path), "wanted": ["accel_x_m_s2"]}
+    order |= {"most_numbers": 10**6, "most_bytes": 10**9}
     done = subprocess.run(
         [sys.executable, "-c", PRINTING, EXTRACTOR],
         input=json.dumps(order).encode(),
@@ -280,7 +281,7 @@ def test_a_file_that_unfolds_is_refused(tmp_path, frame):
 def test_the_process_that_reads_has_no_more_memory_than_it_needs(tmp_path, monkeypatch):
     path = packed(tmp_path / "log.mf4", ["wheel_speed_fl_rad_s"], 3_000_000)
     assert read_mdf_columns(path) == {"wheel_speed_fl_rad_s"}
-    monkeypatch.setattr(mdf_file, "LEAST_MEMORY_BYTES", 0)
-    monkeypatch.setattr(mdf_file, "MEMORY_PER_BYTE", 0)
+    monkeypatch.setattr(extraction, "LEAST_MEMORY_BYTES", 0)
+    monkeypatch.setattr(extraction, "MEMORY_PER_BYTE", 0)
     with pytest.raises(LogError, match="cannot be read as MDF"):
         read_mdf_columns(path)

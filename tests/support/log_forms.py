@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -148,6 +149,75 @@ def mdf4(frame, folder):
     return Form(folder / "drive.mf4")
 
 
+def _doubles(number: int, columns: list[str]) -> str:
+    signals = "".join(
+        f' SG_ {c} : {64 * i}|64@1- (1,0) [0|0] "{UNITS[c].replace("²", "2")}" ECU\n'
+        for i, c in enumerate(columns)
+    )
+    return f"BO_ {number} Message{number}: {8 * len(columns)} ECU\n{signals}\n"
+
+
+def _types(number: int, columns: list[str]) -> str:
+    return "".join(f"SIG_VALTYPE_ {number} {c} : 2;\n" for c in columns)
+
+
+NUMBERED = tuple(enumerate(MESSAGES, start=256))
+DBC = 'VERSION ""\nNS_ :\nBS_:\nBU_: ECU\n\n' + "".join(_doubles(n, c) for n, c in NUMBERED)
+DBC += "".join(_types(n, c) for n, c in NUMBERED)
+"""Messages of CAN FD whose signals are doubles, so that nothing is rounded."""
+
+
+def _on_bus(suffix: str, name: str) -> Callable[[pd.DataFrame, Path], Form]:
+    def form(frame: pd.DataFrame, folder: Path) -> Form:
+        import can
+        from bus_maker import described, write
+
+        # python-can's writers of BLF and MDF subtract times since 1970, of which a float64 holds 0.2 us.
+        start_s = {".blf": 8.0, ".mf4": 0.0}.get(suffix, 1.7e9)
+        messages = [
+            can.Message(
+                timestamp=start_s + float(row["time_s"]),
+                arbitration_id=number,
+                is_extended_id=False,
+                is_fd=True,
+                data=struct.pack(f"<{len(columns)}d", *(float(row[c]) for c in columns)),
+                channel=1,
+            )
+            for row in frame.to_dict("records")
+            for number, columns in NUMBERED
+        ]
+        if suffix == ".trc":  # python-can's writer knows its first time by a frame of classic CAN alone
+            messages.insert(
+                0, can.Message(timestamp=start_s, arbitration_id=1, is_extended_id=False, data=b"0")
+            )
+        return Form(write(folder / f"drive{suffix}", messages, from_0=True), dbc=described(folder, DBC))
+
+    form.__name__ = name
+    return form
+
+
+def mat_5(frame, folder):
+    from scipy.io import savemat
+
+    savemat(folder / "drive.mat", {"log": {c: frame[c].to_numpy() for c in frame}})
+    return Form(folder / "drive.mat")
+
+
+def mat_73(frame, folder):
+    import h5py
+
+    with h5py.File(folder / "drive.mat", "w", userblock_size=512) as root:
+        log = root.create_group("log")
+        log.attrs["MATLAB_class"] = np.bytes_("struct")
+        for c in frame:
+            log[c] = frame[c].to_numpy()[None, :]
+            log[c].attrs["MATLAB_class"] = np.bytes_("double")
+    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
+    raw = (folder / "drive.mat").read_bytes()
+    (folder / "drive.mat").write_bytes(head + raw[len(head) :])
+    return Form(folder / "drive.mat")
+
+
 FORMS: dict[str, Callable[[pd.DataFrame, Path], Form]] = {
     form.__name__: form
     for form in (
@@ -167,5 +237,12 @@ FORMS: dict[str, Callable[[pd.DataFrame, Path], Form]] = {
         parquet_durations,
         one_row_per_message,
         mdf4,
+        _on_bus(".mf4", "mdf_bus"),
+        _on_bus(".blf", "blf"),
+        _on_bus(".asc", "asc"),
+        _on_bus(".log", "candump"),
+        _on_bus(".trc", "trc"),
+        mat_5,
+        mat_73,
     )
 }

@@ -11,7 +11,7 @@ PACKAGES = ("trpac", "trpac_core", "fmu_src", "scenarios", "sim2real", "trpac_hi
 
 READS = re.compile(
     r".+\.(read_text|read_bytes)|(.+\.)?(open|fdopen|imdecode|imread|VideoCapture|ZipFile|is_zipfile|ParquetFile|read_schema"
-    r"|XMLParser|MDF)|json\.loads?|np\.load|pickle\.\w+|(\w+\.)*(etree|ElementTree|ast)\.(parse|fromstring)"
+    r"|XMLParser|MDF|loadmat)|json\.loads?|np\.load|h5py\.File|pickle\.\w+|(\w+\.)*(etree|ElementTree|ast)\.(parse|fromstring)"
     r"|cantools\..+|eval|exec|compile"
 )
 """Calls that read a file or a text, or run one."""
@@ -29,14 +29,15 @@ OPENED = {
         "parse"
     },  # in a process that may die, of a unit that the reader of archives has unpacked
     "sim2real/logs/parquet_file.py": {"ParquetFile", "read_schema"},  # behind the guard
-    "sim2real/logs/mdf_channels.py": {
-        "open",
-        "MDF",
+    "sim2real/logs/extractor.py": {
         "load",
         "fdopen",
         "read_text",
-    },  # in a process that may die
-    "sim2real/logs/mdf_file.py": {"load", "loads"},  # the answer of that process
+    },  # orders, answers and sizes of that process
+    "sim2real/logs/extraction.py": {"load", "loads"},  # the answer of the process that may die
+    "sim2real/logs/mdf_channels.py": {"open", "MDF"},  # in it
+    "sim2real/logs/bus_frames.py": {"open"},  # in it
+    "sim2real/logs/mat_variables.py": {"open", "loadmat", "File"},  # in it
     "sim2real/logs/formula.py": {"parse"},  # to a syntax tree, of which arithmetic alone is evaluated
     "sim2real/logs/dbc.py": {"load_string"},  # of the text that the guard has read
 }

@@ -167,25 +167,109 @@ def _read_part(path: Path) -> Any:
 # Logs
 
 
+def _drive() -> dict[str, Any]:
+    """The columns of a short drive."""
+    rng, n = np.random.default_rng(1), 250
+    time_s = np.arange(n) * 0.01
+    columns = {"time_s": time_s}
+    for wheel in ("fl", "fr", "rl", "rr"):
+        columns[f"wheel_torque_{wheel}_nm"] = 400.0 * np.cos(2.0 * time_s) + rng.normal(size=n)
+        columns[f"wheel_speed_{wheel}_rad_s"] = 52.0 + rng.normal(size=n)
+    columns["vehicle_speed_m_s"] = 15.0 + 0.02 * rng.normal(size=n)
+    columns["accel_x_m_s2"] = 4.0 * np.cos(2.0 * time_s)
+    columns["position_m"] = 15.0 * time_s
+    return columns
+
+
 def _log(suffix: str) -> Callable[[Path], Path]:
     def make(folder: Path) -> Path:
         import pandas as pd
 
         from sim2real.logs.write import write_log
 
-        rng, n = np.random.default_rng(1), 250
-        time_s = np.arange(n) * 0.01
-        columns = {"time_s": time_s}
-        for wheel in ("fl", "fr", "rl", "rr"):
-            columns[f"wheel_torque_{wheel}_nm"] = 400.0 * np.cos(2.0 * time_s) + rng.normal(size=n)
-            columns[f"wheel_speed_{wheel}_rad_s"] = 52.0 + rng.normal(size=n)
-        columns["vehicle_speed_m_s"] = 15.0 + 0.02 * rng.normal(size=n)
-        columns["accel_x_m_s2"] = 4.0 * np.cos(2.0 * time_s)
-        columns["position_m"] = 15.0 * time_s
-        write_log(pd.DataFrame(columns), folder / f"good{suffix}")
+        write_log(pd.DataFrame(_drive()), folder / f"good{suffix}")
         return folder / f"good{suffix}"
 
     return make
+
+
+def _dbc(folder: Path) -> Path:
+    """A message of two floats for each two columns, in no more than eight bytes: TRC is written without CAN FD."""
+    names = [name for name in _drive() if name != "time_s"]
+    lines = ['VERSION ""', "BS_:", "BU_: ECU"]
+    for k in range(0, len(names), 2):
+        lines.append(f"BO_ {256 + k} M{k}: 8 ECU")
+        lines += [f' SG_ {n} : {32 * i}|32@1- (1,0) [0|0] "" ECU' for i, n in enumerate(names[k : k + 2])]
+    lines += [f"SIG_VALTYPE_ {256 + i // 2 * 2} {name} : 1;" for i, name in enumerate(names)]
+    (folder / "car.dbc").write_text("\n".join(lines) + "\n")
+    return folder / "car.dbc"
+
+
+def _bus(suffix: str) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        import can
+
+        drive = _drive()
+        time_s, *columns = drive.values()
+        frames = [np.column_stack(columns[k : k + 2]).astype("<f4") for k in range(0, len(columns), 2)]
+        writers: dict[str, Any] = {
+            ".blf": can.BLFWriter,
+            ".asc": can.ASCWriter,
+            ".log": can.CanutilsLogWriter,
+            ".trc": can.TRCWriter,
+            ".mf4": can.MF4Writer,
+        }
+        with writers[suffix](str(folder / f"good{suffix}")) as writer:
+            for i, t in enumerate(time_s):
+                for k, values in enumerate(frames):
+                    data = values[i].tobytes().ljust(8, b"\0")
+                    number = 256 + 2 * k
+                    writer.on_message_received(
+                        can.Message(2e9 + t, number, is_extended_id=False, data=data, channel=1)
+                    )
+        _dbc(folder)
+        return folder / f"good{suffix}"
+
+    return make
+
+
+def _read_bus(path: Path) -> Any:
+    from sim2real.logs import read_log
+
+    return read_log(path, dbc=path.with_name("car.dbc")).to_frame().to_numpy(dtype=float)
+
+
+def _described(folder: Path) -> Path:
+    """A DBC file beside a log of the bus."""
+    _bus(".blf")(folder)
+    return folder / "car.dbc"
+
+
+def _read_described(path: Path) -> Any:
+    return _read_bus(path.with_name("good.blf"))
+
+
+def _mat5(folder: Path) -> Path:
+    from scipy.io import savemat
+
+    savemat(folder / "good.mat", {"drive": _drive()}, do_compression=True)
+    return folder / "good.mat"
+
+
+def _mat73(folder: Path) -> Path:
+    """HDF5 behind 512 bytes, with MATLAB's classes as attributes."""
+    import h5py
+
+    path = folder / "good.mat"
+    with h5py.File(path, "w", userblock_size=512) as root:
+        group = root.create_group("drive")
+        group.attrs["MATLAB_class"] = np.bytes_("struct")
+        for name, values in _drive().items():
+            group.create_dataset(name, data=values[None, :], compression="gzip")
+            group[name].attrs["MATLAB_class"] = np.bytes_("double")
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+    return path
 
 
 def _read_log(path: Path) -> Any:
@@ -290,6 +374,14 @@ KINDS = {
     "log_csv": Kind(_log(".csv"), _read_log, _scenario_errors, text=True),
     "log_parquet": Kind(_log(".parquet"), _read_log, _scenario_errors, exact=True),
     "log_mf4": Kind(_log(".mf4"), _read_log, _scenario_errors),
+    "log_blf": Kind(_bus(".blf"), _read_bus, _scenario_errors),
+    "log_asc": Kind(_bus(".asc"), _read_bus, _scenario_errors, text=True),
+    "log_candump": Kind(_bus(".log"), _read_bus, _scenario_errors, text=True),
+    "log_trc": Kind(_bus(".trc"), _read_bus, _scenario_errors, text=True),
+    "log_bus_mf4": Kind(_bus(".mf4"), _read_bus, _scenario_errors),
+    "log_dbc": Kind(_described, _read_described, _scenario_errors, text=True),
+    "log_mat5": Kind(_mat5, _read_log, _scenario_errors),
+    "log_mat73": Kind(_mat73, _read_log, _scenario_errors),
     "bus_dbc": Kind(
         _shipped("trpac_hil", "trpac.dbc"),
         _load("load_codec", "trpac_hil.codec"),
