@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import sys
 from dataclasses import replace
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.console import Console
 from rich.table import Table
 
 from trpac_cli.console import (
@@ -20,14 +22,20 @@ from trpac_cli.console import (
     refuse,
     require_folder,
 )
+from trpac_core.files import quoted
 
 if TYPE_CHECKING:
     from trpac_hil.bus import BusSettings
     from trpac_hil.plant_node import PlantJob
+    from trpac_hil.readiness import Readiness
 
 COMMAND, PLANT_COMMAND = "trpac hil", "trpac hil-plant"
-EXIT_NO_LOG = 4
-"""Exit code where the log could not be written."""
+EXIT_NO_LOG, EXIT_DEAD = 4, 5
+"""Exit codes where log or recording could not be written, and where a process beside the loop died."""
+WAIT_S = 5.0
+"""Default of the longest time to listen before the first cycle [s]."""
+TABLE_WIDTH = 160
+"""Width of the table of signals where it goes to no terminal [characters]."""
 MULTICAST = "239.74.163.2"
 """Default channel of udp_multicast: python-can's group for IPv4."""
 CHANNELS = {"virtual": "trpac", "udp_multicast": MULTICAST, "socketcan": "can0"}
@@ -45,7 +53,13 @@ Options = Annotated[
 ]
 Dbc = Annotated[
     Path | None,
-    typer.Option(help="DBC file with the shipped one's names, but ids, layout and scales of yours."),
+    typer.Option(help="DBC file: any with --signals; else with the shipped one's names."),
+]
+Signals = Annotated[
+    Path | None,
+    typer.Option(
+        help="Mapping file of the DBC file's signals, as of a log: vehicle_speed_m_s: {column: Motion.VehSpd} ..."
+    ),
 ]
 Rate = Annotated[float, typer.Option(min=100.0, max=1000.0, help="Cycles per second.")]
 Duration = Annotated[
@@ -69,6 +83,7 @@ def hil(
     channel: Channel = None,
     bus_option: Options = None,
     dbc: Dbc = None,
+    signals: Signals = None,
     rate_hz: Rate = 1000.0,
     duration_s: Duration = None,
     wheel: Annotated[str, typer.Option(help="Wheel of a unit of one wheel: fl, fr, rl or rr.")] = "fl",
@@ -88,6 +103,21 @@ def hil(
         bool, typer.Option("--with-plant", help="Also play the car on the same bus: no hardware needed.")
     ] = False,
     scenario: ScenarioOption = None,
+    wait_s: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            max=1e6,
+            help="Longest time to listen for what the unit needs, before the first cycle \\[s].",
+        ),
+    ] = WAIT_S,
+    no_wait: Annotated[
+        bool, typer.Option("--no-wait", help="Begin at once; the estimate starts when its signals come.")
+    ] = False,
+    record_bus: Annotated[
+        Path | None,
+        typer.Option(help="File for all messages of the bus: .blf, .asc, .log (candump) or .mf4."),
+    ] = None,
     no_log: Annotated[bool, typer.Option("--no-log", help="Write no log.mf4.")] = False,
     no_counters: Annotated[
         bool, typer.Option("--no-counters", help="The senders do not count their messages.")
@@ -112,7 +142,11 @@ def hil(
     Example on a bus: trpac hil --fmu dist/TrpacEstimator.fmu --interface socketcan
     --channel can0 --frames frames --camera camera.yaml --out out/hil
 
-    Exit codes: 0 done or ended by Ctrl-C, 2 unusable input or no bus, 4 ran, but the log could not be written.
+    Before the first cycle it listens for what the unit needs and shows it; what
+    does not come within --wait-s is named, and nothing is written (exit code 2).
+
+    Exit codes: 0 done or ended by Ctrl-C, also with deadlines missed; 2 unusable input, no bus, or signals missing; 4
+    ran, but the log could not be written; 5 a process beside the loop died, which ended the run.
     """
     from trpac_core.errors import TrpacError
     from trpac_hil.codec import DBC_FILE
@@ -121,6 +155,7 @@ def hil(
     from trpac_hil.settings import HilSettings
     from trpac_hil.unit import WHEELS
 
+    _silence_libraries()
     require_folder(COMMAND, out)
     if wheel not in WHEELS:
         refuse(COMMAND, f"--wheel {wheel}: expected {', '.join(WHEELS)}.")
@@ -132,6 +167,7 @@ def hil(
             kind=kind_to_build(COMMAND, fmu, unit),
             bus=bus,
             dbc=dbc or DBC_FILE,
+            signals=signals,
             rate_hz=rate_hz,
             duration_s=duration_s,
             wheel=wheel,
@@ -140,7 +176,9 @@ def hil(
             frames=frames,
             fps=fps,
             parameters=_method(method) | _parameters(parameter),
-            plant=_plant_job(bus, dbc, scenario, rate_hz, frames is None) if with_plant else None,
+            plant=_plant_job(bus, dbc, signals, scenario, rate_hz, frames is None) if with_plant else None,
+            wait_s=None if no_wait else wait_s,
+            record_bus=_recording(record_bus),
             log=not no_log,
             counters=not no_counters,
             live=sys.stderr.isatty() and not events_only,
@@ -149,13 +187,18 @@ def hil(
             camera_threads=camera_threads,
             spin_ns=SPIN_NS,
         )
-        summary = run_hil(settings)
+        summary = run_hil(settings, show=_show_readiness, report_wait=lambda text: complain(COMMAND, text))
     except (TrpacError, OSError) as error:
         refuse(COMMAND, error)
     _show(summary, out)
-    if summary["log"]["problem"]:
-        complain(COMMAND, f"no log: {summary['log']['problem']}")
-        raise typer.Exit(EXIT_NO_LOG)
+    if summary["died"]:
+        complain(COMMAND, f"{summary['ended']}, which ended the run.")
+        raise typer.Exit(EXIT_DEAD)
+    for what, key in (("log", "log"), ("recording", "bus_recording")):
+        problem = summary.get(key, {}).get("problem")
+        if problem:
+            complain(COMMAND, f"no {what}: {problem}")
+            raise typer.Exit(EXIT_NO_LOG)
 
 
 def hil_plant(
@@ -163,6 +206,7 @@ def hil_plant(
     channel: Channel = None,
     bus_option: Options = None,
     dbc: Dbc = None,
+    signals: Signals = None,
     rate_hz: Rate = 1000.0,
     duration_s: Duration = None,
     scenario: ScenarioOption = None,
@@ -188,14 +232,18 @@ def hil_plant(
     from trpac_hil.plant_node import open_plant_node
     from trpac_hil.rig import RUN_UP_NS, Stopper
 
+    _silence_libraries()
     try:
-        job = _plant_job(_bus(interface, channel, bus_option), dbc, scenario, rate_hz, True)
+        job = _plant_job(_bus(interface, channel, bus_option), dbc, signals, scenario, rate_hz, True)
         job = replace(job, camera_fps=camera_fps, camera_delay_s=camera_delay_s)
         node = open_plant_node(job, lambda kind, text: complain(PLANT_COMMAND, text))
     except (ScenarioError, OSError) as error:
         refuse(PLANT_COMMAND, error)
     stopper = Stopper()
-    print(f"{PLANT_COMMAND}: driving on {job.bus.interface} {job.bus.channel}; Ctrl-C ends.", file=sys.stderr)
+    print(
+        f"{PLANT_COMMAND}: driving on {job.bus.name}; sends {', '.join(node.sends)}. Ctrl-C ends.",
+        file=sys.stderr,
+    )
     with stopper.by_signal():
         slots = None if duration_s is None else round(duration_s * rate_hz)
         node.run(SystemClock().now_ns() + RUN_UP_NS, stopper, slots)
@@ -203,10 +251,17 @@ def hil_plant(
     print(f"{PLANT_COMMAND}: {node.left_out} cycles were left out for being late.", file=sys.stderr)
 
 
+def _silence_libraries() -> None:
+    """Keep warnings of the libraries off the terminal: what is wrong is said by this command, once."""
+    for library in ("can", "cantools"):
+        logging.getLogger(library).setLevel(logging.ERROR)
+
+
 def _bus(interface: str, channel: str | None, options: list[str] | None) -> BusSettings:
     from trpac_hil.bus import BusSettings, bus_options
     from trpac_hil.errors import HilError
 
+    BusSettings(interface).check()
     chosen = channel or CHANNELS.get(interface)
     if chosen is None:
         raise HilError(f"--channel: missing; interface {interface} has no default here.")
@@ -237,24 +292,44 @@ def _parameters(pairs: list[str] | None) -> dict[str, float]:
 
 
 def _plant_job(
-    bus: BusSettings, dbc: Path | None, scenario: Path | None, rate_hz: float, sees: bool
+    bus: BusSettings,
+    dbc: Path | None,
+    signals: Path | None,
+    scenario: Path | None,
+    rate_hz: float,
+    sees: bool,
 ) -> PlantJob:
     from trpac_hil.codec import DBC_FILE
     from trpac_hil.plant_node import PLAIN_SCENARIO, PlantJob
 
     return PlantJob(
-        scenario or PLAIN_SCENARIO, bus, dbc or DBC_FILE, rate_hz, camera_fps=20.0 if sees else 0.0
+        scenario or PLAIN_SCENARIO, bus, dbc or DBC_FILE, signals, rate_hz, camera_fps=20.0 if sees else 0.0
     )
+
+
+def _recording(path: Path | None) -> Path | None:
+    """A recording's file; raises HilError for a format that cannot be written."""
+    from trpac_hil.bus_file import FORMATS
+    from trpac_hil.errors import HilError
+
+    if path is not None and path.suffix not in FORMATS:
+        raise HilError(f"--record-bus {quoted(path)}: expected a name that ends in {', '.join(FORMATS)}.")
+    return path
+
+
+def _show_readiness(readiness: Readiness) -> None:
+    """Print what was heard before the first cycle, on standard error."""
+    from trpac_hil.screen import readiness_table
+
+    console = Console(stderr=True, highlight=False)
+    if not console.is_terminal:
+        console.width = TABLE_WIDTH
+    console.print(readiness_table(readiness))
 
 
 def _show(summary: dict[str, Any], out: Path) -> None:
     """Print the outcome."""
-    console, overruns = Terminal(), summary["overruns"]
-    worst = f", the worst by {overruns['worst_ms']:.2f} ms" if overruns["count"] else ""
-    console.print(
-        f"{summary['cycles']} cycles at {summary['rate_hz']:g} Hz, {overruns['count']} deadlines missed{worst}; "
-        f"{overruns['beyond_5_ms']} by more than 5 ms. Held for {summary['held_cycles']} cycles."
-    )
+    console = Terminal()
     if summary["timing"]:
         table = Table()
         for heading in ("", "median", "p99", "max"):
@@ -266,5 +341,7 @@ def _show(summary: dict[str, Any], out: Path) -> None:
     for text in (summary["system"].get("priority"), summary["system"].get("core")):
         if text:
             console.print(text)
+    for line in summary["verdict"]:
+        console.print(line, soft_wrap=True)
     log = f"{out / summary['log']['file']}  " if summary["log"]["file"] else ""
     console.print(f"{log}{out / 'summary.json'}", soft_wrap=True)

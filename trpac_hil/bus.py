@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -11,9 +12,11 @@ from typing import Any
 import can
 from can.interfaces import BACKENDS
 
+from scenarios.errors import suggestion
 from trpac_core.files import quoted
 from trpac_hil.errors import HilError
 from trpac_hil.inputs import ReportEvent
+from trpac_hil.message import CLASSIC_BYTES, padded
 
 RETRY_S = 0.5
 """Pause between attempts to reopen a lost bus [s]."""
@@ -21,8 +24,20 @@ MOST_AT_ONCE = 512
 """Frames of any kind that one cycle reads at most; the rest waits for the next cycle."""
 BUS_ERRORS = (can.CanError, OSError)
 """Exceptions that interfaces raise when a bus fails."""
-OPENING_ERRORS = (*BUS_ERRORS, ValueError, TypeError, ImportError, NotImplementedError)
+OPENING_ERRORS = (*BUS_ERRORS, ValueError, TypeError, ImportError, NameError, NotImplementedError)
 """Exceptions that they raise when a bus cannot be opened."""
+NOT_INSTALLED = (ImportError, NameError, can.CanInterfaceNotImplementedError)
+"""Those of them that python-can raises where what an interface needs is missing."""
+FD_PROTOCOLS = (can.CanProtocol.CAN_FD, can.CanProtocol.CAN_FD_NON_ISO)
+FD_OPTION = "fd"
+"""Option of most interfaces that makes the bus one of CAN FD."""
+WHY = {
+    errno.ENODEV: "there is no such channel on this machine; `ip link` lists those that there are",
+    errno.EAFNOSUPPORT: "this system's kernel has no SocketCAN",
+    errno.ENETDOWN: "the channel is down; `ip link set CHANNEL up` takes it up",
+    errno.EPERM: "permission is denied",
+}
+"""What the usual errors of opening mean."""
 GARBLED_BY = (
     ValueError,
     TypeError,
@@ -44,13 +59,46 @@ class BusSettings:
     channel: str = "trpac"
     options: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def name(self) -> str:
+        """Interface and channel, as messages name them."""
+        return f"{self.interface} {self.channel}"
+
+    def check(self) -> None:
+        """Raise HilError where python-can knows no such interface."""
+        if self.interface not in can.VALID_INTERFACES:
+            hint = suggestion(quoted(self.interface), sorted(can.VALID_INTERFACES))
+            raise HilError(f"--interface {quoted(self.interface)}: unknown to python-can; {hint}")
+
     def open(self) -> can.BusABC:
         """The open bus; raises what the interface raises.
 
         No filters are set: where python-can filters in software, a read without waiting ends at the first message that
         is filtered out.
         """
-        return can.Bus(channel=self.channel, interface=self.interface, **self.options)
+        options = dict(self.options)
+        if self.interface == "virtual" and options.pop(FD_OPTION, False):
+            options["protocol"] = can.CanProtocol.CAN_FD
+        return can.Bus(channel=self.channel, interface=self.interface, **options)
+
+
+def frame(frame_id: int, extended: bool, data: bytes) -> can.Message:
+    """A message; one of more than 8 bytes is of CAN FD, filled up to one of its lengths."""
+    fd = len(data) > CLASSIC_BYTES
+    return can.Message(
+        arbitration_id=frame_id,
+        is_extended_id=extended,
+        data=data.ljust(padded(len(data)), b"\0") if fd else data,
+        is_fd=fd,
+    )
+
+
+def no_fd(what: str) -> str:
+    """What to say of a message that is too long for a bus without CAN FD."""
+    return (
+        f"{what}, which is CAN FD, and the bus is classic CAN (8 bytes at most). "
+        "Open it with --bus-option fd=true and the bit rates that the interface wants for it."
+    )
 
 
 def bus_options(pairs: Sequence[str]) -> dict[str, Any]:
@@ -66,13 +114,21 @@ def bus_options(pairs: Sequence[str]) -> dict[str, Any]:
 
 
 class Link:
-    """The bus as the loop uses it: no method waits, and none raises."""
+    """The bus as the loop uses it: no method waits, and none raises.
+
+    `tap` is called with each message that comes or goes.
+    """
 
     def __init__(
-        self, open_bus: Callable[[], can.BusABC], report: ReportEvent, retry_s: float = RETRY_S
+        self,
+        open_bus: Callable[[], can.BusABC],
+        report: ReportEvent,
+        retry_s: float = RETRY_S,
+        name: str = "the bus",
     ) -> None:
-        """Open the bus; raises HilError where it cannot be opened at the start."""
+        """Open the bus; raises HilError, with its `name`, where it cannot be opened at the start."""
         self._open, self._report, self._retry_s = open_bus, report, retry_s
+        self.tap: Callable[[can.Message], None] | None = None
         self.losses = self.unsent = self.error_frames = self.garbled = self.backlogs = 0
         self._found: can.BusABC | None = None
         self._closing = threading.Event()
@@ -80,15 +136,24 @@ class Link:
         try:
             self._bus: can.BusABC | None = open_bus()
         except OPENING_ERRORS as error:
+            why = f"{type(error).__name__}: {quoted(error)}"
+            if isinstance(error, NOT_INSTALLED):
+                why = f"the interface's driver or package is not installed ({quoted(error)})"
+            why = WHY.get(getattr(error, "errno", None) or 0, why).rstrip(".")
             raise HilError(
-                f"The bus cannot be opened: {type(error).__name__}: {error}. Check --interface, --channel and "
-                "--bus-option; docs/hil.md has examples."
+                f"{quoted(name)} cannot be opened: {why}. Check --interface, --channel and --bus-option; docs/hil.md "
+                "has examples."
             ) from error
 
     @property
     def up(self) -> bool:
         """Whether there is a bus."""
         return self._bus is not None
+
+    @property
+    def fd(self) -> bool:
+        """Whether the bus is one of CAN FD."""
+        return self._bus is not None and self._bus.protocol in FD_PROTOCOLS
 
     def receive(self) -> list[can.Message]:
         """Messages received since the last call, from at most `MOST_AT_ONCE` frames; none while the bus is lost."""
@@ -113,6 +178,8 @@ class Link:
                 self._leave_aside("identifier or data of a wrong kind")
             elif not message.is_remote_frame:
                 messages.append(message)
+                if self.tap is not None:
+                    self.tap(message)
         self.backlogs += 1
         return messages
 
@@ -136,9 +203,12 @@ class Link:
         """Send a message; one that cannot be sent is counted in `unsent`."""
         if self._bus is None:
             return
-        message = can.Message(arbitration_id=frame_id, is_extended_id=extended, data=data)
+        message = frame(frame_id, extended, data)
         try:
             self._bus.send(message)
+            if self.tap is not None:
+                message.timestamp, message.is_rx = time.time(), False
+                self.tap(message)
         except can.CanOperationError as error:
             # The transmit buffer is full: no node acknowledges, or too much is sent. The bus is not lost.
             self.unsent += 1

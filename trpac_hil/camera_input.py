@@ -62,24 +62,30 @@ class CameraInput:
     def share_motion(self, odometer: Odometer, values: Mapping[str, float]) -> None:
         """Share the car's motion with the camera's process; lost signals are 0, a lost yaw rate is NaN."""
         if self._motion is not None:
-            accel, steering = values["AccelX"], values["SteeringAngle"]
+            accel, steering = values["accel_x_m_s2"], values["steering_angle_rad"]
             self._motion.set(
                 (
                     odometer.speed_m_s,
                     accel if math.isfinite(accel) else 0.0,
                     steering if abs(steering) < STEEPEST_RAD else 0.0,
-                    values["YawRate"],
+                    values["yaw_rate_rad_s"],
                     odometer.position_m,
                 )
             )
 
     def news(
-        self, heard: Heard, fresh: bool, doubted: bool, odometer: Odometer, now_ns: int, report: ReportEvent
+        self,
+        heard: Heard | None,
+        fresh: bool,
+        doubted: bool,
+        odometer: Odometer,
+        now_ns: int,
+        report: ReportEvent,
     ) -> bool:
         """Stamp new results; returns whether the classes for the unit have changed.
 
-        `heard` is the newest message RoadClass, `fresh` whether it has just come, and `doubted` whether two devices
-        send it: then no result of the bus is used.
+        `heard` is the newest message RoadClass, None where the bus has none, `fresh` whether it has just come, and
+        `doubted` whether two devices send it: then no result of the bus is used.
         """
         stamps = self.stamps
         by_bus = self._results is None
@@ -127,9 +133,11 @@ class CameraInput:
             for row in rows
         ]
 
-    def _by_bus(self, heard: Heard, fresh: bool, now_ns: int, report: ReportEvent) -> list[CameraResult]:
+    def _by_bus(
+        self, heard: Heard | None, fresh: bool, now_ns: int, report: ReportEvent
+    ) -> list[CameraResult]:
         """The result in the message RoadClass where it is new; its picture was taken `RoadClass_Age` before."""
-        if not fresh or heard.values["RoadClass_Number"] == self._number_by_bus:
+        if heard is None or not fresh or heard.values["RoadClass_Number"] == self._number_by_bus:
             return []
         values = heard.values
         self._number_by_bus = values["RoadClass_Number"]

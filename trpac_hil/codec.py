@@ -1,253 +1,324 @@
-"""The bus's messages by the DBC file: bytes to values by signal name, and back."""
+"""The messages of a bus by its DBC file, and the quantities of the rig that they carry."""
 
 from __future__ import annotations
 
-import math
-from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from cantools.database.can import Message, Signal
+from cantools.database.can import Message
 
+from sim2real.logs import mapping
 from sim2real.logs.dbc import DAMAGE, load_dbc
 from sim2real.logs.errors import LogError
 from trpac_core.files import quoted
 from trpac_hil.errors import HilError
+from trpac_hil.message import CLASSIC_BYTES, FD_SIZES, NO_COUNTER, Coded
+from trpac_hil.roles import LOADS, SHIPPED, TRUTH, Resolver, Role
 
 DBC_FILE = Path(__file__).with_name("trpac.dbc")
-NOT_AVAILABLE = "not_available"
-"""Name of the raw value that means: the signal has no value."""
-STALE_AFTER = "StaleAfterMs"
-"""Attribute of a signal in the DBC file: greatest age at which it is used [ms]."""
-
-INPUT_MESSAGES = ("WheelSpeeds", "WheelTorques", "VehicleMotion", "Chassis", "RoadClass", "PlantTruth")
+CLASS_MESSAGE, TRUTH_MESSAGE = "RoadClass", "PlantTruth"
+INPUT_MESSAGES = ("WheelSpeeds", "WheelTorques", "VehicleMotion", "Chassis", CLASS_MESSAGE, TRUTH_MESSAGE)
 OUTPUT_MESSAGES = ("Estimate", "EstimateWheels", "Health")
-COUNTER_OF = "_Counter"
-LIFE_COUNTER = "LifeCounter"
+OURS = (*OUTPUT_MESSAGES, CLASS_MESSAGE, TRUTH_MESSAGE)
+"""Messages that have the shipped layout where a DBC file of others does not have them."""
 
-LONGEST_MS = 60_000
-"""Greatest cycle time and age limit [ms]; from the definitions in trpac.dbc."""
-CLASSIC_BYTES, FD_SIZES = 8, (8, 12, 16, 20, 24, 32, 48, 64)
-"""Longest message of classic CAN, and lengths of a CAN FD message from there on [bytes]; ISO 11898-1."""
-GREATEST_FLOATS = {16: 65504.0, 32: 3.4028234e38, 64: 1.7976931348623157e308}
-"""Greatest number that a float of so many bits holds; IEEE 754."""
+DIMENSIONLESS = {"": "1", "-": "1"}
+"""Other spellings of the unit of a number; a unit that is not stated is the shipped one."""
 
 
 @dataclass(frozen=True)
-class Coded:
-    """A message of the bus with its coding.
+class Supply:
+    """What brings new values: a message, or those messages that a multiplexer marks.
 
     Attributes
     ----------
-    message : Message
-        Its layout.
-    signals : tuple of str
-        Its signals but the counter.
-    counter, counts : str, int
-        Signal that counts the messages, and its number of values; empty and 0 if there is none.
-    absent : mapping
-        Physical value that stands for "not available", by signal.
-    bounds : mapping
-        Least and greatest value that can be sent, by signal.
-    stale_ns : mapping
-        Greatest age at which a signal is used [ns].
-    cycle_ns : int
-        Its cycle time; 0 where the file has none [ns].
+    name : str
+        Message, with multiplexers and their values behind it.
+    message, signal : str
+        Message, and a signal that comes with it; empty where all of the message's do.
+    stale_ns : int
+        Age at which it is lost [ns].
     """
 
-    message: Message
-    signals: tuple[str, ...]
-    counter: str
-    counts: int
-    absent: Mapping[str, float]
-    bounds: Mapping[str, tuple[float, float]]
-    stale_ns: Mapping[str, int]
-    cycle_ns: int
-
-    @classmethod
-    def of(cls, message: Message) -> Coded:
-        """The coding of a message of a DBC file; raises one of `DAMAGE`."""
-        absent, stale_ns = {}, {}
-        for signal in message.signals:
-            for raw, name in (signal.choices or {}).items():
-                if str(name) == NOT_AVAILABLE:
-                    absent[signal.name] = float(raw * signal.scale + signal.offset)
-            attributes = signal.dbc.attributes if signal.dbc else {}
-            if STALE_AFTER in attributes:
-                stale_ns[signal.name] = _whole_ms(
-                    attributes[STALE_AFTER].value, f"{STALE_AFTER} of {signal.name}"
-                )
-        counters = [s for s in message.signals if s.name.endswith(COUNTER_OF) or s.name == LIFE_COUNTER]
-        return cls(
-            message,
-            tuple(s.name for s in message.signals if s not in counters),
-            counters[0].name if counters else "",
-            2 ** counters[0].length if counters else 0,
-            absent,
-            {s.name: _bounds(s, absent.get(s.name)) for s in message.signals},
-            stale_ns,
-            _whole_ms(message.cycle_time, "its cycle time") if message.cycle_time else 0,
-        )
-
-    def encode(self, values: Mapping[str, float], count: int = 0) -> bytes:
-        """Bytes of a message; values are limited to their range, missing ones and NaN sent as not available or 0."""
-        ready: dict[str, float] = {self.counter: count % self.counts} if self.counts else {}
-        for name in self.signals:
-            value = values.get(name, math.nan)
-            low, high = self.bounds[name]
-            if low <= value <= high:
-                ready[name] = value
-            elif math.isnan(value):
-                ready[name] = self.absent.get(name, min(max(0.0, low), high))
-            else:
-                ready[name] = low if value < low else high
-        return bytes(self.message.encode(ready, strict=False))
-
-    def decode(self, data: bytes) -> tuple[dict[str, float], int]:
-        """Values by signal, NaN where not available, and the counter, -1 without one; ValueError on a wrong length."""
-        least = self.message.length
-        if len(data) not in (least, _padded(least)):
-            raise ValueError(
-                f"{self.message.name}: {len(data)} bytes; expected {least}, or these filled up to a length of CAN FD, "
-                "see docs/hil_dbc.md."
-            )
-        values: dict[str, float] = self.message.decode(data, decode_choices=False)  # type: ignore[assignment]
-        count = int(values.pop(self.counter)) if self.counts else -1
-        for name, absent in self.absent.items():
-            if values[name] == absent:
-                values[name] = math.nan
-        return values, count
-
-
-def _padded(length: int) -> int:
-    """Length of the shortest CAN FD message of 8 bytes or more that holds so many bytes [bytes]."""
-    return next((size for size in FD_SIZES if size >= length), length)
-
-
-def _whole_ms(value: object, what: str) -> int:
-    """A time of the DBC file [ns]; ValueError where it is none."""
-    try:
-        milliseconds = int(value)  # type: ignore[call-overload]
-    except (TypeError, ValueError, OverflowError):
-        milliseconds = 0
-    if not 0 < milliseconds <= LONGEST_MS:
-        raise ValueError(f"{what} is {quoted(value)}; expected 1 to {LONGEST_MS} ms")
-    return milliseconds * 1_000_000
-
-
-def _bounds(signal: Signal, absent: float | None) -> tuple[float, float]:
-    """Least and greatest value of a signal: its stated range, else what its bits hold except "not available"."""
-    if signal.is_float:
-        greatest = GREATEST_FLOATS[signal.length]
-        low, high = sorted(
-            value * float(signal.scale) + float(signal.offset) for value in (-greatest, greatest)
-        )
-    else:
-        raw = (0, 2**signal.length - 1)
-        if signal.is_signed:
-            raw = (-(2 ** (signal.length - 1)), 2 ** (signal.length - 1) - 1)
-        low, high = sorted(float(value * signal.scale + signal.offset) for value in raw)
-        step = abs(float(signal.scale))
-        low, high = low + step * (low == absent), high - step * (high == absent)
-    return (
-        low if signal.minimum is None else max(low, float(signal.minimum)),
-        high if signal.maximum is None else min(high, float(signal.maximum)),
-    )
+    name: str
+    message: str
+    signal: str
+    stale_ns: int
 
 
 @dataclass(frozen=True)
 class Codec:
-    """The messages of a DBC file by name."""
+    """The messages of a bus.
+
+    Attributes
+    ----------
+    path, signals : Path, Path or None
+        The DBC file, and the file that maps quantities to its signals.
+    messages : mapping
+        Those that are used, by name.
+    roles : mapping
+        Quantities by name, as sums of signals.
+    ours : frozenset of str
+        Messages whose layout is that of trpac.dbc, since the DBC file has none of these names.
+    notes : tuple of str
+        What is not used, and why.
+    """
 
     path: Path
+    signals: Path | None
     messages: Mapping[str, Coded]
+    roles: Mapping[str, Role]
+    ours: frozenset[str] = frozenset()
+    notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Coded:
         """A message by its name."""
         return self.messages[name]
+
+    @property
+    def received(self) -> tuple[str, ...]:
+        """Names of the messages that come in."""
+        return tuple(name for name in self.messages if name not in OUTPUT_MESSAGES)
+
+    @property
+    def beyond_classic(self) -> str:
+        """Name and length of a message that comes in and is too long for a bus without CAN FD; empty for none."""
+        long = [m for name in self.received if (m := self.messages[name].message).length > CLASSIC_BYTES]
+        return f"{long[0].name} has {long[0].length} bytes" if long else ""
 
     def by_id(self, names: Iterable[str]) -> dict[tuple[int, bool], Coded]:
         """Messages by identifier and by whether it is an extended one."""
         chosen = (self.messages[name] for name in names)
         return {(c.message.frame_id, c.message.is_extended_frame): c for c in chosen}
 
+    @property
+    def supplies(self) -> tuple[Supply, ...]:
+        """What brings the quantities and the classes of the road, without the plant's truth."""
+        roles = [role for name, role in self.roles.items() if name not in TRUTH]
+        found = self.supplies_of(roles)
+        if CLASS_MESSAGE in self.messages:
+            found += (self._supply(CLASS_MESSAGE, next(iter(self[CLASS_MESSAGE].signals))),)
+        return tuple(dict.fromkeys(found))
 
-def load_codec(path: Path = DBC_FILE) -> Codec:
-    """The codec of a DBC file with the messages and signals of the shipped one; ids, layout and scales may differ.
+    def supplies_of(self, roles: Iterable[Role]) -> tuple[Supply, ...]:
+        """What brings some quantities."""
+        return tuple(
+            dict.fromkeys(self._supply(term.message, term.signal) for role in roles for term in role.terms)
+        )
+
+    def _supply(self, name: str, signal: str) -> Supply:
+        coded = self[name]
+        selection = coded.selections.get(signal, ())
+        alike = [each for each in coded.signals if coded.selections.get(each, ()) == selection]
+        words = "".join(f"_{multiplexer}_{value}" for multiplexer, value in selection)
+        stale_ns = min(coded.stale_ns[each] for each in alike)
+        return Supply(name + words, name, alike[0] if selection else "", stale_ns)
+
+    def require(self, roles: Iterable[str]) -> None:
+        """Raise HilError, with the lines to write, where a quantity has no source."""
+        missing = [name for name in roles if name not in self.roles]
+        if missing:
+            raise HilError(
+                f"{quoted(self.signals)}: lacks {', '.join(missing)}. Expected lines such as "
+                f"`{missing[0]}: {{column: Message.Signal}}`, with names of {quoted(self.path)}."
+            )
+
+
+def load_codec(path: Path = DBC_FILE, signals: Path | None = None) -> Codec:
+    """The codec of a DBC file.
+
+    Parameters
+    ----------
+    path : Path
+        The DBC file. Without `signals` it has the messages and signals of the shipped one; identifiers, layout, scales
+        and units may differ.
+    signals : Path or None
+        Mapping file: `columns` of the log format from `Message.Signal`, and `counters` by message.
 
     Raises
     ------
     HilError
-        The file cannot be read, lacks messages or signals (all of them are named), or has one that cannot be coded.
+        A file cannot be read; messages, signals or units are missing or unknown (all of them are named); a message
+        cannot be coded; an identifier of what is sent is in use.
     """
-    codec = _read(path)
-    if path != DBC_FILE:
-        shipped = _read(DBC_FILE).messages
-        missing = [name for name in shipped if name not in codec.messages]
-        missing += [
-            f"{name}.{signal}"
-            for name, coded in shipped.items()
-            if name in codec.messages
-            for signal in coded.signals
-            if signal not in codec[name].signals
-        ]
-        if missing:
-            raise HilError(
-                f"{quoted(path)}: lacks {', '.join(missing)}. Expected all messages and signals of {DBC_FILE}."
-            )
-    return codec
+    theirs = _read(path)
+    shipped = theirs if path == DBC_FILE else _read(DBC_FILE)
+    messages: dict[str, Message] = {}
+    for message in theirs:
+        messages.setdefault(message.name, message)
+    shipped_messages = {message.name: message for message in shipped}
+    used = {name: _names(shipped_messages[name]) for name in (*INPUT_MESSAGES, *OUTPUT_MESSAGES)}
+    ours, notes, counters = frozenset[str](), list[str](), dict[str, str]()
+    invalid: Mapping[str, tuple[float, ...]] = {}
+    specs = SHIPPED
+    if signals is None:
+        _require_shipped(path, messages, shipped_messages)
+    else:
+        stated = _mapping(signals)
+        counters = stated.counters
+        specs = {name: spec for name, spec in stated.columns.items() if name in SHIPPED}
+        messages, ours, notes = _with_ours(path, messages, shipped_messages)
+        specs |= {name: SHIPPED[name] for name in (*LOADS, *TRUTH) if _has(messages, SHIPPED[name].column)}
+        _require_counted(signals, path, messages, counters)
+        _require_known(signals, path, messages, stated.invalid)
+        invalid = stated.invalid
+    _require_units(path, messages, shipped_messages)
+    resolver = Resolver(messages, quoted(path), quoted(signals) if signals else "", specs)
+    roles = {name: resolver.role(name) for name in specs}
+    if resolver.problems:
+        raise HilError("\n".join(resolver.problems))
+    if signals is not None:
+        used = {name: used[name] for name in OURS if name in messages}
+    for role in roles.values():
+        for term in role.terms:
+            used[term.message] = used.get(term.message, frozenset()) | {term.signal}
+    coded = {}
+    for name, names in used.items():
+        message = messages[name]
+        try:
+            _require_single(message, theirs)
+            none = {s: _none_of(f"{name}.{s}", invalid) for s in names} if name not in ours else {}
+            coded[name] = _tried(message, names, counters.get(name, ""), none)
+        except DAMAGE as error:
+            like = f" Expected one like that of {DBC_FILE}." if name in shipped_messages else ""
+            raise HilError(f"{quoted(path)}: {name} cannot be used ({quoted(error)}).{like}") from error
+    return Codec(path, signals, coded, roles, ours, tuple(notes))
 
 
-def _read(path: Path) -> Codec:
+def _read(path: Path) -> list[Message]:
     try:
-        messages = load_dbc(path).messages
+        return load_dbc(path).messages
     except LogError as error:
         raise HilError(f"{error} {DBC_FILE} is one.") from error
-    used: Counter[object] = Counter(
-        key for m in messages for key in (m.name, (m.frame_id, m.is_extended_frame))
-    )
-    coded = {}
-    for message in messages:
-        if message.name not in INPUT_MESSAGES + OUTPUT_MESSAGES:
+
+
+def _mapping(path: Path) -> mapping.Mapping:
+    try:
+        return mapping.load_mapping(path)
+    except LogError as error:
+        raise HilError(str(error)) from error
+
+
+def _names(message: Message) -> frozenset[str]:
+    return frozenset(signal.name for signal in message.signals)
+
+
+def _has(messages: Mapping[str, Message], column: str | None) -> bool:
+    name, _, signal = (column or "").partition(".")
+    return name in messages and signal in _names(messages[name])
+
+
+def _require_shipped(path: Path, messages: Mapping[str, Message], shipped: Mapping[str, Message]) -> None:
+    """Raise HilError where a DBC file that is used without a mapping lacks messages or signals of the shipped one."""
+    missing = [name for name in shipped if name not in messages]
+    missing += [
+        f"{name}.{signal}"
+        for name, message in shipped.items()
+        if name in messages
+        for signal in Coded.of(message, _names(message)).signals
+        if signal not in _names(messages[name])
+    ]
+    if missing:
+        raise HilError(
+            f"{quoted(path)}: lacks {', '.join(missing)}. Expected all messages and signals of {DBC_FILE}, or a file "
+            "that maps other names: --signals."
+        )
+
+
+def _require_units(path: Path, messages: Mapping[str, Message], shipped: Mapping[str, Message]) -> None:
+    """Raise HilError where a signal that is no quantity of the log format states another unit than the shipped one."""
+    for name in (*OUTPUT_MESSAGES, CLASS_MESSAGE):
+        units = {s.name: s.unit or "" for s in messages[name].signals} if name in messages else {}
+        for signal in shipped[name].signals:
+            stated, ours = (DIMENSIONLESS.get(u, u) for u in (units.get(signal.name, ""), signal.unit or ""))
+            if stated not in ("1", ours):
+                raise HilError(
+                    f"{quoted(path)}: {name}.{signal.name} is in [{quoted(stated)}]; expected [{ours}], as in "
+                    f"{DBC_FILE}."
+                )
+
+
+def _with_ours(
+    path: Path, messages: Mapping[str, Message], shipped: Mapping[str, Message]
+) -> tuple[dict[str, Message], frozenset[str], list[str]]:
+    """A DBC file's messages and those of `OURS` that it lacks; raises HilError where an identifier is taken.
+
+    A message of such a name with other signals is one of the car's own, and not used.
+    """
+    whole, ours, notes = dict(messages), set[str](), list[str]()
+    taken = {(m.frame_id, m.is_extended_frame): m.name for m in messages.values()}
+    for name in OURS:
+        layout = shipped[name]
+        signals = set(Coded.of(layout, _names(layout)).signals)
+        if name in messages and signals <= _names(messages[name]):
             continue
-        try:
-            if used[message.name] > 1 or used[message.frame_id, message.is_extended_frame] > 1:
-                raise ValueError("its name or its identifier is there twice")
-            coded[message.name] = _tried(message)
-        except DAMAGE as error:
+        other = taken.get((layout.frame_id, layout.is_extended_frame))
+        if other is not None and name in OUTPUT_MESSAGES:
             raise HilError(
-                f"{quoted(path)}: {message.name} cannot be used ({quoted(error)}). "
-                f"Expected one like that of {DBC_FILE}."
-            ) from error
-    return Codec(path, coded)
+                f"{quoted(path)}: {name} is sent with the identifier 0x{layout.frame_id:X} of trpac.dbc, which is that "
+                f"of {quoted(other)} here. Add a message {name} with a free identifier: copy its lines from {DBC_FILE}."
+            )
+        if other is not None:
+            whole.pop(name, None)
+            notes.append(
+                f"{name} is not received: its identifier 0x{layout.frame_id:X} is that of {quoted(other)}."
+            )
+            continue
+        whole[name] = layout
+        ours.add(name)
+    return whole, frozenset(ours), notes
 
 
-def _tried(message: Message) -> Coded:
+def _require_counted(
+    signals: Path, path: Path, messages: Mapping[str, Message], counters: Mapping[str, str]
+) -> None:
+    """Raise HilError where a stated counter is not in the DBC file."""
+    for name, counter in counters.items():
+        if name not in messages or (counter != NO_COUNTER and counter not in _names(messages[name])):
+            raise HilError(
+                f"{quoted(signals)}: counters: {quoted(path)} has no {quoted(name)}.{quoted(counter)}. "
+                f"Expected `counters: {{Message: Signal}}`, or `{NO_COUNTER}` in place of the signal."
+            )
+
+
+def _none_of(column: str, invalid: Mapping[str, tuple[float, ...]]) -> tuple[float, ...]:
+    """Values of a signal that a mapping names as invalid: by `Message.Signal`, by `Signal`, or for all columns."""
+    plain = {name.partition("#")[0]: values for name, values in invalid.items()}
+    return tuple(v for name in (column, column.partition(".")[2], "*") for v in plain.get(name, ()))
+
+
+def _require_known(
+    signals: Path, path: Path, messages: Mapping[str, Message], invalid: Mapping[str, tuple[float, ...]]
+) -> None:
+    """Raise HilError where a mapping names invalid values of a signal that the DBC file does not have."""
+    known = {s.name for m in messages.values() for s in m.signals} | {"*"}
+    for name in (name.partition("#")[0] for name in invalid):
+        if name not in known and not _has(messages, name):
+            raise HilError(
+                f"{quoted(signals)}: invalid: {quoted(path)} has no signal {quoted(name)}. Expected Message.Signal, or "
+                '"*" for all.'
+            )
+
+
+def _require_single(message: Message, all_messages: Iterable[Message]) -> None:
+    """Raise ValueError where a message's name or identifier is there twice."""
+    key = (message.frame_id, message.is_extended_frame)
+    alike = [m for m in all_messages if (m.frame_id, m.is_extended_frame) == key or m.name == message.name]
+    if len(alike) > 1:
+        others = ", ".join(f"{quoted(m.name)} 0x{m.frame_id:X}" for m in alike)
+        raise ValueError(f"its name or its identifier is there twice: {others}")
+
+
+def _tried(
+    message: Message, used: Collection[str], counter: str, invalid: Mapping[str, Collection[float]]
+) -> Coded:
     """The coding of a message after test values were encoded and decoded; raises one of `DAMAGE`."""
     longest = CLASSIC_BYTES if message.name in OUTPUT_MESSAGES else FD_SIZES[-1]
     if message.length > longest:
         raise ValueError(f"it has {message.length} bytes; expected at most {longest}")
-    if message.is_multiplexed():
+    coded = Coded.of(message, used, counter, invalid)
+    if coded.selections and message.name in (*OUTPUT_MESSAGES, CLASS_MESSAGE):
         raise ValueError("it is multiplexed")
-    names = [signal.name for signal in message.signals]
-    if len(set(names)) < len(names):
-        raise ValueError("a signal is there twice")
-    coded = Coded.of(message)
-    for name, (low, high) in coded.bounds.items():
-        if not -math.inf < low <= high < math.inf:
-            raise ValueError(f"{name} has no range")
-    counter = message.get_signal_by_name(coded.counter) if coded.counts else None
-    if counter and (counter.is_float or counter.is_signed or (counter.scale, counter.offset) != (1, 0)):
-        raise ValueError(f"{coded.counter} does not count by one from 0")
-    sent = [
-        coded.encode(dict.fromkeys(coded.signals, value))
-        for value in (math.nan, -math.inf, 0.0, 1.0, math.inf)
-    ]
-    for data in (*sent, *(bytes([byte]) * message.length for byte in (0x00, 0x55, 0xAA, 0xFF))):
-        values, _ = coded.decode(data)
-        if values.keys() != set(coded.signals) or not all(
-            isinstance(v, float | int) for v in values.values()
-        ):
-            raise ValueError("its signals cannot be told apart")
+    coded.try_out()
     return coded

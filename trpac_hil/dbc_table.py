@@ -7,7 +7,8 @@ from pathlib import Path
 
 from cantools.database.can import Message, Signal
 
-from trpac_hil.codec import NOT_AVAILABLE, STALE_AFTER, load_codec
+from trpac_hil.codec import load_codec
+from trpac_hil.message import NOT_AVAILABLE, STALE_AFTER
 
 TARGET = Path(__file__).parent.parent / "docs" / "hil_dbc.md"
 _HEAD = """# Messages of `trpac hil`
@@ -23,7 +24,7 @@ the last sign of it.
 
 def document() -> str:
     """The page of all messages as Markdown text."""
-    messages = [coded.message for coded in load_codec().messages.values()]
+    messages = sorted((c.message for c in load_codec().messages.values()), key=lambda m: int(m.frame_id))
     return _HEAD + "".join(_section(message) for message in messages)
 
 

@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from trpac_core.files import quoted
-from trpac_hil.codec import Codec, Coded
+from trpac_hil.codec import Codec, Supply
+from trpac_hil.message import Coded
 
 MOST_OFTEN = 1.2
 """Greatest lasting rate of a message over the rate of its cycle time [-]; clocks of nodes differ by less."""
@@ -101,14 +102,17 @@ class Heard:
         Its counter.
     data : bytes
         Its bytes.
-    values : dict
-        By signal, NaN where not available.
+    values, times : dict
+        Newest value by signal, NaN where not available or out of range; and when it came, as `at_ns`. Of a multiplexed
+        message they are of several messages.
     senders : Senders
         Whether more than one device sends it.
     new : bool
         Whether the counter of the last message had changed.
     received, lost, frozen, broken : int
         Messages received; missing by the counter; with an unchanged counter; of a wrong length.
+    outside : dict
+        How often a signal was outside its stated range.
     """
 
     coded: Coded
@@ -118,35 +122,42 @@ class Heard:
     data: bytes = b""
     new: bool = False
     values: dict[str, float] = field(default_factory=dict)
+    times: dict[str, int] = field(default_factory=dict)
     received: int = 0
     lost: int = 0
     frozen: int = 0
     broken: int = 0
+    outside: dict[str, int] = field(default_factory=dict)
 
 
 class Inputs:
-    """The newest value of each signal that comes by bus.
+    """The newest value of each quantity that comes by bus.
 
     Parameters
     ----------
     codec : Codec
-        Messages.
-    names : tuple of str
-        Messages that are received.
+        Messages and quantities.
     report : callable
         Called with what is wrong with messages.
     counters : bool
         Whether a message with an unchanged counter is ignored; False for senders that do not count.
     """
 
-    def __init__(
-        self, codec: Codec, names: tuple[str, ...], report: ReportEvent, counters: bool = True
-    ) -> None:
+    def __init__(self, codec: Codec, report: ReportEvent, counters: bool = True) -> None:
         self.heard: Mapping[str, Heard] = {
-            name: Heard(codec[name], Senders(codec[name].cycle_ns)) for name in names
+            name: Heard(codec[name], Senders(codec[name].cycle_ns)) for name in codec.received
         }
-        self._by_id = {key: self.heard[c.message.name] for key, c in codec.by_id(names).items()}
-        self._message_of = {signal: h for h in self.heard.values() for signal in h.coded.signals}
+        self._by_id = {key: self.heard[c.message.name] for key, c in codec.by_id(codec.received).items()}
+        self._sums = {
+            name: (
+                role.constant,
+                tuple(
+                    (self.heard[t.message], t.signal, t.gain, codec[t.message].stale_ns[t.signal])
+                    for t in role.terms
+                ),
+            )
+            for name, role in codec.roles.items()
+        }
         self._report, self._counters = report, counters
 
     def take(self, frame_id: int, extended: bool, data: bytes, at_ns: int) -> str:
@@ -159,8 +170,9 @@ class Inputs:
             return ""
         name = heard.coded.message.name
         heard.received += 1
+        outside: dict[str, int] = {}
         try:
-            values, count = heard.coded.decode(data)
+            values, count = heard.coded.decode(data, outside)
         except ValueError as error:
             heard.broken += 1
             self._report(f"broken {name}", f"A message was left aside: {quoted(error)}")
@@ -187,23 +199,43 @@ class Inputs:
                 "A sender that does not count needs --no-counters.",
             )
             return ""
+        if outside:
+            self._count_outside(heard, outside)
         heard.lost += ahead - 1
-        heard.values, heard.count, heard.at_ns, heard.data = values, count, at_ns, data
+        heard.values.update(values)
+        heard.times.update(dict.fromkeys(values, at_ns))
+        heard.count, heard.at_ns, heard.data = count, at_ns, data
         return name
 
-    def value(self, signal: str, now_ns: int) -> float:
-        """The newest value of a signal; NaN where there is none, it is too old, or two devices send it."""
-        heard = self._message_of[signal]
-        limit_ns = heard.coded.stale_ns.get(signal)
-        if heard.at_ns < 0 or (limit_ns is not None and now_ns - heard.at_ns > limit_ns):
+    def _count_outside(self, heard: Heard, outside: Mapping[str, int]) -> None:
+        for signal, number in outside.items():
+            heard.outside[signal] = heard.outside.get(signal, 0) + number
+            name = f"{heard.coded.message.name}.{signal}"
+            low, high = heard.coded.bounds[signal]
+            self._report(
+                f"out of range {name}",
+                f"{name} is outside {low:g} ... {high:g}, its range in the DBC file, and counts as lost.",
+            )
+
+    def value(self, role: str, now_ns: int) -> float:
+        """The newest value of a quantity; NaN where a signal of it is missing, too old, or sent by two devices."""
+        made = self._sums.get(role)
+        if made is None:
             return math.nan
-        return math.nan if now_ns < heard.senders.until_ns else heard.values[signal]
+        total, terms = made
+        for heard, signal, gain, limit_ns in terms:
+            at_ns = heard.times.get(signal, -1)
+            if at_ns < 0 or now_ns - at_ns > limit_ns or now_ns < heard.senders.until_ns:
+                return math.nan
+            total += gain * heard.values[signal]
+        return total
 
     def doubted(self, now_ns: int) -> list[str]:
         """Names of the messages that two devices send."""
         return [name for name, heard in self.heard.items() if now_ns < heard.senders.until_ns]
 
-    def age_ns(self, message: str, now_ns: int) -> int:
-        """Age of the newest message of a kind, -1 where none has come [ns]."""
-        at_ns = self.heard[message].at_ns
+    def age_ns(self, supply: Supply, now_ns: int) -> int:
+        """Age of what a supply brought last, -1 where it never has [ns]."""
+        heard = self.heard[supply.message]
+        at_ns = heard.times.get(supply.signal, -1) if supply.signal else heard.at_ns
         return now_ns - at_ns if at_ns >= 0 else -1

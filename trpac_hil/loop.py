@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from trpac_core.sensors import LONGEST_STEP_S
 from trpac_hil.bus import Link
 from trpac_hil.camera_input import CameraInput
-from trpac_hil.codec import Codec
+from trpac_hil.codec import CLASS_MESSAGE, Codec
 from trpac_hil.deadlines import SPIN_NS, Deadlines, SystemClock, WallWatch, wait_until
 from trpac_hil.delays import Delays
 from trpac_hil.events import Events
 from trpac_hil.inputs import Inputs
 from trpac_hil.preview_stamps import Odometer
-from trpac_hil.records import AGED, LOGGED
+from trpac_hil.records import LOGGED
 from trpac_hil.shared import Ring
 from trpac_hil.unit import Estimates, Unit
 
@@ -25,7 +25,6 @@ CHECK_EVERY_NS = 100_000_000
 """Time between checks of bus state, time of day and helper processes [ns]."""
 LONG_NS = 5_000_000
 """Overruns beyond this are also counted as long ones [ns]."""
-REQUIRED_MESSAGES = ("WheelSpeeds", "WheelTorques", "VehicleMotion")
 STARTING, RUNNING, HELD_INPUT, HELD_BUS, HELD_UNIT, ENDED = 0, 1, 2, 3, 4, 7
 """Values of the signal Status."""
 NAN = math.nan
@@ -48,6 +47,7 @@ class Counts:
     worst_ns: int = 0
     overworked: int = 0
     discarded: int = 0
+    starting: int = 0
     held: int = 0
     clock_jumps: int = 0
     lost: dict[str, int] = field(default_factory=dict)
@@ -85,8 +85,9 @@ class Loop:
         self._polled_ns = clock.now_ns()
         self._unit_time_s, self._unit_slot = 0.0, -1
         self._sent = dict.fromkeys(("Estimate", "EstimateWheels", "Health"), 0)
-        self._required = dict(unit.wiring.required)
-        self._wired = dict(self._required)
+        self._wired = dict(unit.wiring.required)
+        self._supplies = codec.supplies
+        self._required = codec.supplies_of(codec.roles[role] for role in self._wired.values())
         self._references = unit.references(tuple(self._wired))
         self._fresh: dict[str, bool] = {}
         self._next_check_ns = self._next_health_ns = 0
@@ -128,12 +129,17 @@ class Loop:
         cpu_began_ns = self._clock.cpu_ns()
         fresh = self._receive(began_ns)
         values = self._snapshot(began_ns)
-        self.odometer.drive(began_ns, values["VehicleSpeed"], passed_s if slot else 0.0)
+        self.odometer.drive(began_ns, values["vehicle_speed_m_s"], passed_s if slot else 0.0)
         camera_input = self._camera_input
         camera_input.share_motion(self.odometer, values)
-        heard, doubted = self._inputs.heard["RoadClass"], self._inputs.doubted(began_ns)
+        heard, doubted = self._inputs.heard.get(CLASS_MESSAGE), self._inputs.doubted(began_ns)
         if camera_input.news(
-            heard, "RoadClass" in fresh, "RoadClass" in doubted, self.odometer, began_ns, self._events.report
+            heard,
+            CLASS_MESSAGE in fresh,
+            CLASS_MESSAGE in doubted,
+            self.odometer,
+            began_ns,
+            self._events.report,
         ):
             self._unit.give_class(camera_input.classes, camera_input.number)
         readings = self._readings(values)
@@ -174,18 +180,18 @@ class Loop:
         }
 
     def _snapshot(self, now_ns: int) -> dict[str, float]:
-        """Current value of all signals, NaN where lost; reports required messages that are lost or back."""
+        """Current value of all quantities, NaN where lost; reports what is required and is lost or back."""
         value = self._inputs.value
-        values = {signal: value(signal, now_ns) for signal in LOGGED.values()}
-        for name in REQUIRED_MESSAGES:
-            age_ns = self._inputs.age_ns(name, now_ns)
-            limit_ns = next(iter(self._inputs.heard[name].coded.stale_ns.values()), age_ns)
-            here = 0 <= age_ns <= limit_ns
+        values = {role: value(role, now_ns) for role in LOGGED}
+        for supply in self._required:
+            name, age_ns = supply.name, self._inputs.age_ns(supply, now_ns)
+            here = 0 <= age_ns <= supply.stale_ns
             if self._fresh.get(name, False) and not here:
                 self.counts.lost[name] = self.counts.lost.get(name, 0) + 1
                 self._events.report(
                     f"lost {name}",
-                    f"{name}: none for more than {limit_ns * 1e-6:g} ms. TRPAC is held with flag 0 until it is back.",
+                    f"{name}: none for more than {supply.stale_ns * 1e-6:g} ms. TRPAC is held with flag 0 until it is "
+                    "back.",
                 )
             elif here and not self._fresh.get(name, True):
                 self._events.report(f"back {name}", f"{name} is back.")
@@ -194,12 +200,12 @@ class Loop:
         return values
 
     def _readings(self, values: dict[str, float]) -> list[float]:
-        """Values of the unit's inputs; an optional signal is used, and can be lost, from its first value on."""
-        for variable, signal in self._unit.wiring.optional.items():
-            if variable not in self._wired and values[signal] == values[signal]:
-                self._wired[variable] = signal
+        """Values of the unit's inputs; an optional one is used, and can be lost, from its first value on."""
+        for variable, role in self._unit.wiring.optional.items():
+            if variable not in self._wired and values[role] == values[role]:
+                self._wired[variable] = role
                 self._references = self._unit.references(tuple(self._wired))
-        return [values[signal] for signal in self._wired.values()]
+        return [values[role] for role in self._wired.values()]
 
     def _judge(self, estimates: Estimates | None, readings: Sequence[float], doubted: bool) -> int:
         """Value of the signal Status in this cycle."""
@@ -213,7 +219,7 @@ class Loop:
             )
             return HELD_UNIT
         if self._missing(readings):
-            started = len(self._fresh) == len(REQUIRED_MESSAGES)
+            started = len(self._fresh) == len(self._required)
             return HELD_INPUT if started else STARTING
         return HELD_INPUT if doubted else RUNNING
 
@@ -266,13 +272,13 @@ class Loop:
         if now_ns >= self._next_health_ns:
             self._next_health_ns = now_ns + HEALTH_EVERY_NS
             picture_ms = self._camera_input.picture_age_ms(now_ns)
-            ages_ns = [self._inputs.age_ns(name, now_ns) for name in REQUIRED_MESSAGES]
+            ages_ns = [self._inputs.age_ns(supply, now_ns) for supply in self._required]
             self._send(
                 "Health",
                 {
                     "Overruns": float(self.counts.overruns),
                     "WorstOverrun": self.counts.worst_ns * 1e-6,
-                    "InputAge": max(ages_ns) * 1e-6 if min(ages_ns) >= 0 else math.inf,
+                    "InputAge": max(ages_ns, default=0) * 1e-6 if min(ages_ns, default=0) >= 0 else math.inf,
                     "PictureAge": math.inf if math.isnan(picture_ms) else picture_ms,
                     "BusLosses": float(self._bus.losses),
                 },
@@ -282,6 +288,7 @@ class Loop:
         counts = self.counts
         counts.overworked += cpu_ns > self._deadlines.period_ns
         counts.cycles += 1
+        counts.starting += status == STARTING
         counts.held += status in (HELD_INPUT, HELD_BUS, HELD_UNIT)
         if missed_ns:
             counts.late_ends += 1
@@ -306,12 +313,14 @@ class Loop:
                 slot * self._deadlines.period_ns * 1e-9,
                 step_s,
                 self.odometer.position_m,
-                *(values[signal] for signal in LOGGED.values()),
+                *(values[role] for role in LOGGED),
                 camera_input.number,
                 *(surface for surface, _ in camera_input.classes),
                 *(Q_v for _, Q_v in camera_input.classes),
                 estimates.TRPAC,
                 estimates.TRPAC_std,
+                estimates.low,
+                estimates.high,
                 estimates.K_v,
                 estimates.flag,
                 estimates.excitation,
@@ -322,7 +331,7 @@ class Loop:
                 *(part * 1e-3 for part in timing_ns),
                 left_out,
                 self.counts.overruns,
-                *(age * 1e-6 if (age := age_ns(name, now_ns)) >= 0 else NAN for name in AGED),
+                *(age * 1e-6 if (age := age_ns(s, now_ns)) >= 0 else NAN for s in self._supplies),
                 camera_input.picture_age_ms(now_ns),
                 camera_input.age_under_wheel_ms(now_ns),
             ]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from trpac_core.vehicle import WHEELS
+from trpac_hil.codec import Supply
+from trpac_hil.roles import SHIPPED
 from trpac_hil.unit import Wiring
 
 TIME = "time_s"
@@ -20,20 +23,8 @@ class Column:
     kind: str = "f8"
 
 
-LOGGED = {
-    **{f"wheel_speed_{w}_rad_s": f"WheelSpeed_{w.upper()}" for w in WHEELS},
-    **{f"wheel_torque_{w}_nm": f"WheelTorque_{w.upper()}" for w in WHEELS},
-    "vehicle_speed_m_s": "VehicleSpeed",
-    "accel_x_m_s2": "AccelX",
-    "accel_y_m_s2": "AccelY",
-    "yaw_rate_rad_s": "YawRate",
-    "steering_angle_rad": "SteeringAngle",
-    **{f"vertical_load_{w}_n": f"VerticalLoad_{w.upper()}" for w in WHEELS},
-    **{f"theta_true_{w}": f"Theta_{w.upper()}" for w in WHEELS},
-}
-"""Signal of the bus by log column; NaN where it is lost."""
-AGED = ("WheelSpeeds", "WheelTorques", "VehicleMotion", "Chassis", "RoadClass")
-"""Messages whose age is recorded."""
+LOGGED = tuple(SHIPPED)
+"""Quantities by their log column; NaN where lost, or where the bus does not carry them."""
 
 _UNITS = {"_rad_s": "rad/s", "_nm": "N.m", "_m_s": "m/s", "_m_s2": "m/s2", "_rad": "rad", "_n": "N"}
 
@@ -43,20 +34,27 @@ def _unit(name: str) -> str:
     return fitting[-1] if fitting else "1"
 
 
-def columns(wiring: Wiring) -> tuple[Column, ...]:
-    """The columns of a run, in the order in which the loop writes them."""
+def age_column(supply: Supply) -> str:
+    """Column of the age of what a supply brings."""
+    return f"age_{supply.name}_ms"
+
+
+def columns(wiring: Wiring, supplies: Sequence[Supply] = ()) -> tuple[Column, ...]:
+    """The columns of a run whose inputs have these supplies, in the order in which the loop writes them."""
     sides = [("", "")] if len(wiring.sides) == 1 else [("_left", ", left track"), ("_right", ", right track")]
     wheels = WHEELS if len(wiring.wheels) > 1 else ()
     return (
         Column(TIME, "s", "start of the cycle's slot"),
         Column("step_s", "s", "step of the unit; 0 where it discarded the step"),
         Column("position_m", "m", "way driven, integrated from the vehicle speed"),
-        *(Column(name, _unit(name), f"signal {signal}; NaN: lost") for name, signal in LOGGED.items()),
+        *(Column(name, _unit(name), "as received; NaN: lost") for name in LOGGED),
         Column("frame_id", "", "number of what the unit was told of the road", "i4"),
         *(Column(f"image_class{s}", "", f"0 dry, 1 wet, 2 snow_ice, -1 none{t}", "i1") for s, t in sides),
         *(Column(f"image_confidence{s}", "1", f"Q_v{t}") for s, t in sides),
         Column("TRPAC", "1", "fused estimate, as sent"),
         Column("TRPAC_std", "1", "its standard deviation"),
+        Column("TRPAC_low", "1", "lower end of its interval; NaN: the unit gives none"),
+        Column("TRPAC_high", "1", "upper end of its interval"),
         Column("K_v", "1/s", "visual gain"),
         Column("flag", "", "visual confidence flag", "u1"),
         Column("excitation_flag", "", "the fused estimate runs", "u1"),
@@ -71,7 +69,10 @@ def columns(wiring: Wiring) -> tuple[Column, ...]:
         Column("missed_us", "us", "end of the cycle after its deadline; 0 where kept", "f4"),
         Column("left_out", "", "cycles left out before this one", "u4"),
         Column("overruns", "", "overruns so far", "u4"),
-        *(Column(f"age_{m}_ms", "ms", "age of the newest such message; NaN: none yet", "f4") for m in AGED),
+        *(
+            Column(age_column(s), "ms", "age of the newest such message; NaN: none yet", "f4")
+            for s in supplies
+        ),
         Column("age_picture_ms", "ms", "since the newest picture was taken; NaN: none", "f4"),
         Column("age_under_wheel_ms", "ms", "since the picture of the road under the wheel; NaN: none", "f4"),
     )

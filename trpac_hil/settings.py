@@ -27,8 +27,8 @@ class HilSettings:
         Kind of the unit that is built: python or native.
     bus : BusSettings
         Interface and channel.
-    dbc : Path
-        DBC file of the messages.
+    dbc, signals : Path, Path or None
+        DBC file of the messages, and the file that maps quantities to their signals.
     rate_hz : float
         Cycles per second, 100 to 1000.
     duration_s : float or None
@@ -47,6 +47,10 @@ class HilSettings:
         The plant on the same bus; None without it.
     log, counters, live, realtime : bool
         Whether to log; to check message counters; to draw on the terminal; to ask for real-time priority.
+    wait_s : float or None
+        Longest time to listen for what the unit needs before the first cycle; None begins at once [s].
+    record_bus : Path or None
+        File for all messages of the bus, in a format of `trpac_hil.bus_file`.
     core : int or None
         Core of the loop; with real-time priority the last one by default.
     camera_threads : int
@@ -60,6 +64,7 @@ class HilSettings:
     kind: str = PYTHON
     bus: BusSettings = field(default_factory=BusSettings)
     dbc: Path = DBC_FILE
+    signals: Path | None = None
     rate_hz: float = 1000.0
     duration_s: float | None = None
     wheel: str = "fl"
@@ -73,6 +78,8 @@ class HilSettings:
     counters: bool = True
     live: bool = False
     realtime: bool = False
+    wait_s: float | None = None
+    record_bus: Path | None = None
     core: int | None = None
     camera_threads: int = 1
     spin_ns: int = SPIN_NS

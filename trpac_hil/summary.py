@@ -11,9 +11,11 @@ import numpy as np
 from trpac_core.files import file_sha256
 from trpac_hil.bus import Link
 from trpac_hil.camera_input import CameraInput
+from trpac_hil.codec import Codec
 from trpac_hil.events import Events
 from trpac_hil.inputs import Inputs
 from trpac_hil.loop import Counts
+from trpac_hil.readiness import sent
 from trpac_hil.settings import HilSettings
 from trpac_hil.unit import Unit
 
@@ -25,6 +27,7 @@ def summarise(
     unit: Unit,
     counts: Counts,
     events: Events,
+    codec: Codec,
     inputs: Inputs,
     link: Link,
     camera_input: CameraInput,
@@ -52,10 +55,11 @@ def summarise(
         },
         "timing": done["figures"] if done else None,
         "held_cycles": counts.held,
+        "starting_cycles": counts.starting,
         "discarded_steps": counts.discarded,
         "clock_jumps": counts.clock_jumps,
         "signals_lost": counts.lost | ({"camera": camera_input.losses} if camera_input.losses else {}),
-        "bus": _bus(settings, inputs, link),
+        "bus": _bus(settings, unit, codec, inputs, link),
         "camera": _camera(settings, camera_input),
         "events": events.summary(),
         "system": dict(system),
@@ -63,11 +67,20 @@ def summarise(
     }
 
 
-def _bus(settings: HilSettings, inputs: Inputs, link: Link) -> dict[str, Any]:
+def _bus(settings: HilSettings, unit: Unit, codec: Codec, inputs: Inputs, link: Link) -> dict[str, Any]:
     return {
         "interface": settings.bus.interface,
         "channel": settings.bus.channel,
         "dbc": settings.dbc.name,
+        "mapping": settings.signals.name if settings.signals else None,
+        "signals": {name: role.text for name, role in codec.roles.items()},
+        "required": sorted(
+            {
+                s.message
+                for s in codec.supplies_of(codec.roles[role] for role in unit.wiring.required.values())
+            }
+        ),
+        "sent": list(sent(codec, unit.wiring)),
         "losses": link.losses,
         "unsent": link.unsent,
         "error_frames": link.error_frames,
@@ -80,6 +93,7 @@ def _bus(settings: HilSettings, inputs: Inputs, link: Link) -> dict[str, Any]:
                 "frozen": h.frozen,
                 "broken": h.broken,
                 "two_senders": h.senders.noticed,
+                "out_of_range": h.outside,
             }
             for name, h in inputs.heard.items()
         },

@@ -1,7 +1,8 @@
-"""The estimator's unit through fmpy, with the bus's signals as its inputs."""
+"""The estimator's unit through fmpy, with the bus's quantities as its inputs."""
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,13 +20,16 @@ from trpac_core.vehicle import WHEELS
 from trpac_hil.errors import HilError
 
 NO_CLASS = -1
+NAN = math.nan
+INTERVAL = ("TRPAC_low", "TRPAC_high")
+"""Outputs of the interval, which units of older versions do not have."""
 WARM_UP_STEPS = 300
 """Steps before the run: the first ones load code and are slow."""
 WARM_UP_INPUTS = {"wheel_speed": 52.0, "wheel_torque": 150.0, "vehicle_speed": 15.0}
 
 
 class Estimates(NamedTuple):
-    """Estimates of the car or of the one wheel; then theta_hat and flag of each wheel of four."""
+    """Estimates of the car or of the one wheel; theta_hat and flag of each wheel of four; the interval's ends."""
 
     TRPAC: float
     TRPAC_std: float
@@ -35,6 +39,8 @@ class Estimates(NamedTuple):
     TRPAC_dynamics: float
     wheels: tuple[float, ...]
     wheel_flags: tuple[bool, ...]
+    low: float = NAN
+    high: float = NAN
 
     def held(self) -> Estimates:
         """The same estimate with flags and K_v at 0: it is not updated."""
@@ -45,14 +51,14 @@ class Estimates(NamedTuple):
 
 @dataclass(frozen=True)
 class Wiring:
-    """Signals of the bus by the unit's variables.
+    """Quantities of the bus by the unit's variables.
 
     Attributes
     ----------
     wheels : tuple of str
         Wheels that the unit estimates.
     required, optional : mapping
-        Signal by variable; optional ones are set from their first value on.
+        Quantity (a column of the log) by variable; optional ones are set from their first value on.
     sides : tuple of pairs
         Variables of class and confidence, for each side of the unit.
     side_names : tuple of str
@@ -68,37 +74,36 @@ class Wiring:
     @classmethod
     def of_one(cls, wheel: str) -> Wiring:
         """The wiring of the unit of one wheel."""
-        suffix = wheel.upper()
         required = {
-            "wheel_speed": f"WheelSpeed_{suffix}",
-            "wheel_torque": f"WheelTorque_{suffix}",
-            "vehicle_speed": "VehicleSpeed",
+            "wheel_speed": f"wheel_speed_{wheel}_rad_s",
+            "wheel_torque": f"wheel_torque_{wheel}_nm",
+            "vehicle_speed": "vehicle_speed_m_s",
         }
-        optional = {"vertical_load": f"VerticalLoad_{suffix}", **_OF_THE_CAR}
+        optional = {"vertical_load": f"vertical_load_{wheel}_n", **_OF_THE_CAR}
         side = "left" if wheel.endswith("l") else "right"
         return cls((wheel,), required, optional, (("road_class", "road_class_confidence"),), (side,))
 
     @classmethod
     def of_four(cls) -> Wiring:
         """The wiring of the unit of four wheels."""
-        required = {f"wheel_speed.{w}": f"WheelSpeed_{w.upper()}" for w in WHEELS}
-        required |= {f"wheel_torque.{w}": f"WheelTorque_{w.upper()}" for w in WHEELS}
-        optional = {f"vertical_load.{w}": f"VerticalLoad_{w.upper()}" for w in WHEELS}
+        required = {f"wheel_speed.{w}": f"wheel_speed_{w}_rad_s" for w in WHEELS}
+        required |= {f"wheel_torque.{w}": f"wheel_torque_{w}_nm" for w in WHEELS}
+        optional = {f"vertical_load.{w}": f"vertical_load_{w}_n" for w in WHEELS}
         names = ("left", "right")
         sides = tuple((f"road_class.{s}", f"road_class_confidence.{s}") for s in names)
         return cls(
             WHEELS,
-            {**required, "vehicle_speed": "VehicleSpeed"},
-            {**optional, **_OF_THE_CAR, "lateral_acceleration": "AccelY"},
+            {**required, "vehicle_speed": "vehicle_speed_m_s"},
+            {**optional, **_OF_THE_CAR, "lateral_acceleration": "accel_y_m_s2"},
             sides,
             names,
         )
 
 
 _OF_THE_CAR = {
-    "longitudinal_acceleration": "AccelX",
-    "yaw_rate": "YawRate",
-    "steering_angle": "SteeringAngle",
+    "longitudinal_acceleration": "accel_x_m_s2",
+    "yaw_rate": "yaw_rate_rad_s",
+    "steering_angle": "steering_angle_rad",
 }
 
 WIRINGS = ("TrpacEstimator", "TrpacEstimator4W")
@@ -134,7 +139,12 @@ class Unit:
             settings, {v.name: v.type for v in description.modelVariables if v.causality == "parameter"}
         )
         self.references = Instance(slave, description, known).references
-        self._reals, self._flags = map(self.references, _outputs(self.wiring))
+        reals, flags = _outputs(self.wiring)
+        outputs = {v.name for v in description.modelVariables}
+        interval = [f"{name}.vehicle" if len(self.wiring.wheels) > 1 else name for name in INTERVAL]
+        self._has_interval = outputs.issuperset(interval)
+        self._reals = self.references([*reals, *(interval if self._has_interval else ())])
+        self._flags = self.references(flags)
         self._classes, self._confidences = map(self.references, zip(*self.wiring.sides, strict=True))
         self._frame_id = self.references(["frame_id"])
         self._warm_up()
@@ -203,9 +213,10 @@ class Unit:
     def _read(self) -> Estimates:
         reals = self._instance.getReal(self._reals)
         flags = [bool(flag) for flag in self._instance.getBoolean(self._flags)]
+        low, high = reals[-2:] if self._has_interval else (NAN, NAN)
         if len(self.wiring.wheels) == 1:
-            TRPAC, std, K_v, alone = reals
-            return Estimates(TRPAC, std, K_v, flags[0], flags[1], alone, (), ())
+            TRPAC, std, K_v, alone = reals[:4]
+            return Estimates(TRPAC, std, K_v, flags[0], flags[1], alone, (), (), low, high)
         trpac, gains, alone = reals[2:6], reals[6:10], reals[10:14]
         return Estimates(
             reals[0],
@@ -216,6 +227,8 @@ class Unit:
             min(alone),
             tuple(trpac),
             tuple(flags[:4]),
+            low,
+            high,
         )
 
     def close(self) -> None:

@@ -36,6 +36,11 @@ _COMMENT_OR_TEXT = re.compile(r'//[^\n]*|"(?:\\"|[^"])*?"')
 _SIZES = re.compile(r":\s*([-+]?\d+)(?:\s*\|\s*([-+]?\d+))?")
 """Numbers after a colon: bytes of a message, or first bit and bits of a signal."""
 _BRANCHES, _RANGE = re.compile(r"SG_MUL_VAL_[^;]*"), re.compile(r"(\d+)\s*[-+]\s*(\d+)")
+_BODIES = re.compile(r"^[ \t]*(?:BO_[ \t]+(\d+)|SG_[ \t]+(\w+))", re.MULTILINE)
+"""Heads of messages and signals: a message's number, or a signal's name."""
+_VALUE_TABLE = re.compile(
+    r'^[ \t]*VAL_\s+(\d+)\s+([A-Za-z_]\w*)\s+(?:[-+.\w]+\s+"(?:\\"|[^"])*"\s*)*;', re.MULTILINE
+)
 _NO_VALUE = re.compile(
     r"sna|snv|n/?a|(signal|value|data)?\s*(is\s+)?(not|un)\s*(available|avail|valid|defined|used|known|init\w*)"
     r"|invalid|init\w*|err(or)?|fault\w*|fail\w*|undefined|unknown",
@@ -49,11 +54,21 @@ def load_dbc(path: str | Path) -> Database:
     try:
         text = _text(read_bytes(path, MOST_BYTES, "a DBC file"))
         _require_sizes(text)
-        return cantools.database.load_string(text, "dbc")  # type: ignore[return-value]
+        return cantools.database.load_string(_without_orphans(text), "dbc")  # type: ignore[return-value]
     except FileError as error:
         raise LogError(str(error)) from error
     except DAMAGE as error:
         raise LogError(f"{quoted(path)}: cannot be read as DBC file ({quoted(error)}).") from error
+
+
+def _without_orphans(text: str) -> str:
+    """A DBC file's text without value tables of signals that it does not have, at which cantools gives up."""
+    signals: dict[str, set[str]] = {}
+    message = ""
+    for number, name in _BODIES.findall(text):
+        message = number or message
+        signals.setdefault(message, set()).add(name)
+    return _VALUE_TABLE.sub(lambda found: found[0] if found[2] in signals.get(found[1], ()) else "", text)
 
 
 def _text(data: bytes) -> str:

@@ -167,6 +167,8 @@ class Mapping:
         Form of the time column; empty where it is to be found out.
     invalid : dict
         Values that say "no value", by column of the file; "*" is every column.
+    counters : dict
+        Message of a bus to the signal that counts it; no column, and of use on a live bus alone.
     """
 
     path: Path
@@ -174,6 +176,7 @@ class Mapping:
     format: Format = field(default_factory=Format)
     time_form: str = ""
     invalid: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    counters: dict[str, str] = field(default_factory=dict)
 
     def spec(self, column: str) -> Spec:
         """The source of a column of the log format."""
@@ -196,7 +199,7 @@ class _MappingBase(_Strict):
         if isinstance(data, dict) and "columns" in data:
             columns = data["columns"]
             rest = {key: value for key, value in data.items() if key != "columns"}
-            both = sorted(str(key) for key in set(rest) - {"schema", "format", "time", "invalid"})
+            both = sorted(str(key) for key in set(rest) - {"schema", "format", "time", "invalid", "counters"})
             if not isinstance(columns, dict) or both:
                 raise ValueError(
                     f"columns: stands beside {', '.join(both)}; expected all columns in one place."
@@ -228,6 +231,7 @@ MappingFile = create_model(
     format=(Format, Field(default_factory=Format)),
     time=(TimeSource | None, Field(default=None)),
     invalid=(dict[Name, Annotated[list[Factor], Field(max_length=100)]], Field(default_factory=dict)),
+    counters=(dict[Name, Name], Field(default_factory=dict, max_length=1_000)),
     **{name: (Spec, Field(default=None)) for name in COLUMNS},  # type: ignore[call-overload]
 )
 
@@ -250,7 +254,8 @@ def mapping_of(file: BaseModel, path: Path) -> Mapping:
     if time is not None:
         specs[TIME] = Spec(column=time.column, unit=time.unit)
     invalid = {name: tuple(values) for name, values in getattr(file, "invalid").items()}  # noqa: B009
-    return Mapping(path, specs, getattr(file, "format"), time.form if time else "", invalid)  # noqa: B009
+    counters: dict[str, str] = getattr(file, "counters")  # noqa: B009
+    return Mapping(path, specs, getattr(file, "format"), time.form if time else "", invalid, counters)  # noqa: B009
 
 
 def specs_of(file: BaseModel) -> dict[str, Spec]:

@@ -8,7 +8,7 @@ from hil_fakes import MS, FakeBus, FakeClock, FakeUnit
 
 from trpac_core.vision.preview import PreviewConfig
 from trpac_hil.camera_input import CameraInput
-from trpac_hil.codec import INPUT_MESSAGES, load_codec
+from trpac_hil.codec import load_codec
 from trpac_hil.deadlines import Deadlines
 from trpac_hil.delays import Delays
 from trpac_hil.events import Events
@@ -43,11 +43,11 @@ class Bench:
 
     def __post_init__(self) -> None:
         self.bus = FakeBus(CODEC, lambda cycle: driving())
-        self.ring = Ring(len(columns(self.unit.wiring)), 5000)
+        self.ring = Ring(len(columns(self.unit.wiring, CODEC.supplies)), 5000)
         self.stamps = PreviewStamps(PreviewConfig(), 0.05, len(self.unit.wiring.sides))
         self.camera_input = CameraInput(self.stamps, 1000 * MS, self.unit.wiring.side_names)
         self.events = Events(lambda time_s, text: self.told.append(text), lambda: 0.0)
-        self.inputs = Inputs(CODEC, INPUT_MESSAGES, self.events.report)
+        self.inputs = Inputs(CODEC, self.events.report)
 
     def run(self, slots: int) -> Counts:
         start_ns = self.clock.now_ns() + PERIOD_NS
@@ -65,7 +65,7 @@ class Bench:
             spin_ns=self.spin_ns,
         )
         counts = self.loop.run(lambda: False, slots)
-        names = [c.name for c in columns(self.unit.wiring)]
+        names = [c.name for c in columns(self.unit.wiring, CODEC.supplies)]
         rows = self.ring.read()
         self.table = {name: rows[:, place] for place, name in enumerate(names)}
         return counts

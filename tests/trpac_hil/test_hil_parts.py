@@ -39,7 +39,7 @@ from trpac_hil.dbc_table import TARGET, document
 from trpac_hil.deadlines import Deadlines, SystemClock, WallWatch, wait_until
 from trpac_hil.errors import HilError
 from trpac_hil.events import Events
-from trpac_hil.figures import SKETCHED_COLUMNS, Figures
+from trpac_hil.figures import TIMING_COLUMNS, Figures
 from trpac_hil.inputs import Inputs
 from trpac_hil.mdf import MdfLog
 from trpac_hil.plant_node import PLAIN_SCENARIO, PlantJob, PlantNode
@@ -139,7 +139,7 @@ def test_a_message_without_a_counter_is_new_each_time(tmp_path: Path) -> None:
     assert not coded.counter
     data = coded.encode(dict.fromkeys(coded.signals, 50.0), 3)
     assert coded.decode(data)[1] == -1
-    inputs = Inputs(codec, INPUT_MESSAGES, unsaid)
+    inputs = Inputs(codec, unsaid)
     assert [inputs.take(256, False, data, at) for at in (0, 20 * MS, 40 * MS)] == ["WheelSpeeds"] * 3
     assert inputs.heard["WheelSpeeds"].lost == 0
 
@@ -188,38 +188,38 @@ def speeds(count: int, value: float = 50.0) -> tuple[int, bool, bytes]:
 
 
 def test_a_signal_is_lost_when_it_is_older_than_its_limit_and_back_with_the_next_message() -> None:
-    inputs = Inputs(CODEC, INPUT_MESSAGES, unsaid)
-    assert math.isnan(inputs.value("WheelSpeed_FL", 0))
+    inputs = Inputs(CODEC, unsaid)
+    assert math.isnan(inputs.value("wheel_speed_fl_rad_s", 0))
     assert inputs.take(*speeds(0), at_ns=0) == "WheelSpeeds"
-    assert inputs.value("WheelSpeed_FL", 30 * MS) == pytest.approx(50.0)
-    assert math.isnan(inputs.value("WheelSpeed_FL", 30 * MS + 1))
+    assert inputs.value("wheel_speed_fl_rad_s", 30 * MS) == pytest.approx(50.0)
+    assert math.isnan(inputs.value("wheel_speed_fl_rad_s", 30 * MS + 1))
     inputs.take(*speeds(1, 60.0), at_ns=40 * MS)
-    assert inputs.value("WheelSpeed_FL", 41 * MS) == pytest.approx(60.0)
-    assert inputs.age_ns("WheelSpeeds", 41 * MS) == MS
+    assert inputs.value("wheel_speed_fl_rad_s", 41 * MS) == pytest.approx(60.0)
+    assert inputs.age_ns(CODEC.supplies[0], 41 * MS) == MS
 
 
 def test_a_counter_that_stands_still_is_old_news_and_one_that_jumps_counts_the_missing() -> None:
     said: list[str] = []
-    inputs = Inputs(CODEC, INPUT_MESSAGES, lambda kind, text: said.append(kind))
+    inputs = Inputs(CODEC, lambda kind, text: said.append(kind))
     inputs.take(*speeds(14), at_ns=0)
     assert inputs.take(*speeds(14), at_ns=20 * MS) == ""
-    assert inputs.age_ns("WheelSpeeds", 20 * MS) == 20 * MS
+    assert inputs.age_ns(CODEC.supplies[0], 20 * MS) == 20 * MS
     assert inputs.take(*speeds(1), at_ns=21 * MS) == "WheelSpeeds"
     heard = inputs.heard["WheelSpeeds"]
     assert (heard.received, heard.frozen, heard.lost) == (3, 1, 2)
     assert said == ["frozen WheelSpeeds"]
-    without = Inputs(CODEC, INPUT_MESSAGES, unsaid, counters=False)
+    without = Inputs(CODEC, unsaid, counters=False)
     assert [without.take(*speeds(0), at_ns=at) for at in (0, 1)] == ["WheelSpeeds"] * 2
 
 
 def test_what_is_not_available_is_lost_alone_and_what_is_too_short_is_left_aside() -> None:
     said: list[str] = []
-    inputs = Inputs(CODEC, INPUT_MESSAGES, lambda kind, text: said.append(text))
+    inputs = Inputs(CODEC, lambda kind, text: said.append(text))
     coded = CODEC["WheelSpeeds"]
     values = dict.fromkeys(coded.signals, 50.0) | {"WheelSpeed_RL": math.nan}
     inputs.take(256, False, coded.encode(values), at_ns=0)
-    assert math.isnan(inputs.value("WheelSpeed_RL", 1))
-    assert inputs.value("WheelSpeed_RR", 1) == pytest.approx(50.0)
+    assert math.isnan(inputs.value("wheel_speed_rl_rad_s", 1))
+    assert inputs.value("wheel_speed_rr_rad_s", 1) == pytest.approx(50.0)
     assert inputs.take(256, False, b"\x00\x01", at_ns=1) == ""
     assert inputs.take(999, False, b"", at_ns=1) == ""
     assert "2 bytes; expected 8" in said[0]
@@ -307,11 +307,13 @@ def test_results_of_the_cameras_process_come_with_its_work_and_what_it_left_out(
         results,
         motion,
     )
-    odometer, heard = Odometer(), Inputs(CODEC, INPUT_MESSAGES, unsaid).heard["RoadClass"]
+    odometer, heard = Odometer(), Inputs(CODEC, unsaid).heard["RoadClass"]
     captured_ns = driven(20.0, 1.0, odometer)
-    camera.share_motion(odometer, {"AccelX": math.nan, "SteeringAngle": 1.6, "YawRate": 0.2})
+    camera.share_motion(
+        odometer, {"accel_x_m_s2": math.nan, "steering_angle_rad": 1.6, "yaw_rate_rad_s": 0.2}
+    )
     assert motion.get() == pytest.approx([20.0, 0.0, 0.0, 0.2, 20.0])
-    camera.share_motion(odometer, {"AccelX": 1.5, "SteeringAngle": -0.1, "YawRate": 0.2})
+    camera.share_motion(odometer, {"accel_x_m_s2": 1.5, "steering_angle_rad": -0.1, "yaw_rate_rad_s": 0.2})
     assert motion.get()[1:3] == pytest.approx([1.5, -0.1])
     assert not camera.news(heard, False, False, odometer, captured_ns, unsaid)
     results.write([4, captured_ns, captured_ns, 2, 17.5, FAILED, 0.0, 1.0, 0.8])
@@ -520,7 +522,7 @@ def test_figures_are_those_of_all_rows_and_the_newest_one_counts() -> None:
     assert math.isnan(figures.now("TRPAC"))
     for part in (rows[:0], rows[:400], rows[400:]):
         figures.add(part)
-    for name, column in SKETCHED_COLUMNS.items():
+    for name, column in TIMING_COLUMNS.items():
         assert figures.summary()[name]["max"] == pytest.approx(rows[:, places[column]].max(), rel=1e-3)
         assert figures.summary()[name]["median"] == pytest.approx(
             np.median(rows[:, places[column]]), rel=0.01

@@ -147,7 +147,7 @@ def test_the_screen_shows_the_newest_row_the_spreads_and_the_last_words(
     for name, value in newest.items():
         made[-1, PLACES[name]] = value
     figures.add(made)
-    with Screen("unit [fl] at 1000 Hz") as screen:
+    with Screen("unit [fl] at 1000 Hz", {"theta_true_fl": (), "vehicle_speed_m_s": ("work_us",)}) as screen:
         screen.show(figures, [(1.0, "lost WheelSpeeds")])
         screen.show(figures, [(2.0, "back")])
     shown = capsys.readouterr().err

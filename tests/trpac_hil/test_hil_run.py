@@ -212,7 +212,7 @@ def test_ctrl_c_ends_cleanly_with_the_log_written(unit_file: Path, tmp_path: Pat
     ("arguments", "words"),
     [
         (["--fmu", "README.md"], "cannot be unpacked: File is not a zip file"),
-        (["--interface", "no_such", "--channel", "x"], "cannot be opened"),
+        (["--interface", "no_such", "--channel", "x"], "no_such: unknown to python-can"),
         (["--frames", "requirements", "--camera", str(CAMERA)], "no pictures in this folder"),
         (["--frames", "docs"], "--camera"),
         (["--parameter", "estimator.gama=10"], "has no parameter estimator.gama"),
@@ -239,14 +239,15 @@ def test_what_cannot_be_used_is_refused_in_one_line(
     assert not list(tmp_path.glob("out/*"))
 
 
-def test_killed_helpers_are_said_and_the_loop_goes_on(
-    unit_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("name", ["camera", "recorder", "plant"])
+def test_a_process_that_dies_ends_the_run_with_a_summary_and_an_exit_code_of_its_own(
+    name: str, unit_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begin = Rig.start
 
     def kill() -> None:
         for process in multiprocessing.active_children():
-            if process.name.startswith("trpac-hil"):
+            if process.name == f"trpac-hil-{name}":
                 process.kill()
 
     def begin_and_kill(rig: Rig, start_ns: int) -> None:
@@ -254,17 +255,29 @@ def test_killed_helpers_are_said_and_the_loop_goes_on(
         threading.Timer(1.0, kill).start()
 
     monkeypatch.setattr(Rig, "start", begin_and_kill)
-    frames = pictures(tmp_path / "frames")
-    bus = BusSettings("virtual", "test-killed")
-    settings = HilSettings(
-        tmp_path / "out", unit_file, bus, rate_hz=100.0, duration_s=3.0, frames=frames, camera=CAMERA
-    )
-    summary = run_hil(settings)
-    assert summary["ended"] == "time was up"
-    assert summary["cycles"] + summary["overruns"]["left_out"] == 300
-    assert {event["kind"] for event in summary["events"]} >= {"dead camera", "dead recorder"}
-    assert summary["log"]["problem"] == "the recorder's process died"
-    assert [p.name for p in (tmp_path / "out").iterdir()] == ["summary.json"]
+    command = [
+        "hil",
+        "--fmu",
+        str(unit_file),
+        "--channel",
+        f"test-dies-{name}",
+        "--with-plant",
+        "--rate-hz",
+        "100",
+    ]
+    if name == "camera":
+        command += ["--frames", str(pictures(tmp_path / "frames")), "--camera", str(CAMERA)]
+    done = CliRunner().invoke(app, [*command, "--duration-s", "60", "--out", str(tmp_path / "out")])
+    assert done.exit_code == 5, done.output
+    assert f"the process of the {name} died, which ended the run" in done.stderr
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["ended"] == f"the process of the {name} died"
+    assert summary["verdict"][0] == f"Ended: the process of the {name} died."
+    assert 50 < summary["cycles"] + summary["overruns"]["left_out"] < 1000
+    assert f"dead {name}" in {event["kind"] for event in summary["events"]}
+    assert (summary["log"]["problem"] is None) == (name != "recorder")
+    left = {path.name for path in (tmp_path / "out").iterdir()}
+    assert left == ({"summary.json"} if name == "recorder" else {"summary.json", "log.mf4"})
 
 
 @pytest.mark.long
@@ -275,7 +288,9 @@ def test_the_unit_of_four_wheels_runs_on_the_same_bus(tmp_path: Path) -> None:
     archive = build_unit(UNITS["TrpacEstimator4W"], tmp_path / "TrpacEstimator4W.fmu")
     bus = BusSettings("virtual", "test-four")
     job = PlantJob(bus=bus, rate_hz=100.0, camera_delay_s=0.03)
-    summary = run_hil(HilSettings(tmp_path / "out", archive, bus, rate_hz=100.0, duration_s=1.5, plant=job))
+    summary = run_hil(
+        HilSettings(tmp_path / "out", archive, bus=bus, rate_hz=100.0, duration_s=1.5, plant=job)
+    )
     log = columns(tmp_path / "out" / "log.mf4")
     assert (summary["unit"], summary["wheel"]) == ("TrpacEstimator4W", "all")
     assert (log["status"] == 1).sum() > 10
