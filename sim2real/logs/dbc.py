@@ -39,8 +39,9 @@ _BRANCHES, _RANGE = re.compile(r"SG_MUL_VAL_[^;]*"), re.compile(r"(\d+)\s*[-+]\s
 _BODIES = re.compile(r"^[ \t]*(?:BO_[ \t]+(\d+)|SG_[ \t]+(\w+))", re.MULTILINE)
 """Heads of messages and signals: a message's number, or a signal's name."""
 _VALUE_TABLE = re.compile(
-    r'^[ \t]*VAL_\s+(\d+)\s+([A-Za-z_]\w*)\s+(?:[-+.\w]+\s+"(?:\\"|[^"])*"\s*)*;', re.MULTILINE
+    r'^[ \t]*+VAL_\s++(\d++)\s++([A-Za-z_]\w*+)\s++(?:[-+.\w]++\s++"(?:\\"|[^"])*+"\s*+)*+;', re.MULTILINE
 )
+"""A value table: number of the message, name of the signal; matched without going back, in linear time."""
 _NO_VALUE = re.compile(
     r"sna|snv|n/?a|(signal|value|data)?\s*(is\s+)?(not|un)\s*(available|avail|valid|defined|used|known|init\w*)"
     r"|invalid|init\w*|err(or)?|fault\w*|fail\w*|undefined|unknown",
