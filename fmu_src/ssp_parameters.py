@@ -50,11 +50,11 @@ Read = Callable[[str], bytes]
 
 @dataclass(frozen=True)
 class Given:
-    """A parameter of a set: its type and value there, the base unit it is in, and its place for messages."""
+    """A parameter of a set: its type and value there, the base unit it is in, and where it stands, for messages."""
 
     kind: str
     value: Value
-    place: str
+    where: str
     unit: str | None = None
     base: BaseUnit | None = None
     numbers: Mapping[str, int] | None = None
@@ -74,7 +74,7 @@ class Node:
     description: ModelDescription | None = None
 
     @property
-    def place(self) -> str:
+    def where(self) -> str:
         """The element as messages name it."""
         return f"{STRUCTURE}, element '{quoted('.'.join(self.path) or self.element.get('name'))}'"
 
@@ -163,23 +163,23 @@ def bound_values(
 
 def _node(element: Element, path: tuple[str, ...], describe: Callable[[str], ModelDescription]) -> Node:
     nodes: dict[str, Node] = {}
-    place = Node(element, path, nodes).place
+    where = Node(element, path, nodes).where
     for child in element.iterfind(f"{{{SSD}}}Elements/*"):
         name = child.get("name")
         if child.tag not in (f"{{{SSD}}}System", f"{{{SSD}}}Component"):
             if child.find(f"{{{SSD}}}ParameterBindings") is not None:
                 raise UnitFileError(
-                    f"{place}: its element '{quoted(name)}' has no parameters. Leave out its bindings."
+                    f"{where}: its element '{quoted(name)}' has no parameters. Leave out its bindings."
                 )
             continue
         if name in nodes:
-            raise UnitFileError(f"{place}: has two elements '{quoted(name)}'. Name each once.")
+            raise UnitFileError(f"{where}: has two elements '{quoted(name)}'. Name each once.")
         nodes[name] = _node(child, (*path, name), describe)
     if element.tag == f"{{{SSD}}}System":
         return Node(element, path, nodes)
     if (kind := element.get("type", UNIT_TYPE)) != UNIT_TYPE:
         raise UnitFileError(
-            f"{place}: is of type {quoted(kind)}; expected {UNIT_TYPE}. Put the units of that package into this one."
+            f"{where}: is of type {quoted(kind)}; expected {UNIT_TYPE}. Put the units of that package into this one."
         )
     return Node(element, path, nodes, describe(element.get("source")))
 
@@ -196,23 +196,23 @@ class _Bindings:
         for below in node.nodes.values():
             yield from self.of(below)
         for number, binding in enumerate(node.element.findall(f"{{{SSD}}}ParameterBindings/*"), 1):
-            place = f"{node.place}, ParameterBinding {number}"
-            for target, given, must in self._mapped(binding, place):
-                found = _targets(node, target, given.place)
+            where = f"{node.where}, ParameterBinding {number}"
+            for target, given, must in self._mapped(binding, where):
+                found = _targets(node, target, given.where)
                 if not found and must:
                     raise UnitFileError(
-                        f"{given.place}: its target '{quoted(target)}' is no variable of {node.place}. Name a "
+                        f"{given.where}: its target '{quoted(target)}' is no variable of {node.where}. Name a "
                         "variable of a unit, after the names of the elements around it."
                     )
                 if not found:
-                    self.ignored.append(f"{given.place}: '{target}'")
+                    self.ignored.append(f"{given.where}: '{target}'")
                 for owner, name in found:
                     yield (owner.path, name), _converted(given, owner, name)
 
-    def _mapped(self, binding: Element, place: str) -> Iterator[tuple[str, Given, bool]]:
+    def _mapped(self, binding: Element, where: str) -> Iterator[tuple[str, Given, bool]]:
         """Targets and what is given to them, and whether the target is the mapping's own word."""
         prefix = binding.get("prefix", "")
-        root, file = self._content(binding, binding.find(f"{{{SSD}}}ParameterValues"), ".ssv", place)
+        root, file = self._content(binding, binding.find(f"{{{SSD}}}ParameterValues"), ".ssv", where)
         units = [root] if binding.get("source") else [root, self._structure]
         given: dict[str, Given] = {}
         for parameter in root.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
@@ -225,7 +225,7 @@ class _Bindings:
         if mapping is None:
             yield from ((name, one, False) for name, one in given.items())
             return
-        root, file = self._content(mapping, mapping, ".ssm", f"{place}, ParameterMapping")
+        root, file = self._content(mapping, mapping, ".ssm", f"{where}, ParameterMapping")
         left, targets = dict(given), set()
         for entry in root.iterfind(f"{{{SSM}}}MappingEntry"):
             source, target = entry.get("source"), entry.get("target")
@@ -240,10 +240,10 @@ class _Bindings:
             changes = [e for e in entry if e.tag in {f"{{{SSC}}}{name}" for name in TRANSFORMATIONS}]
             keep = entry.get("suppressUnitConversion") in ("true", "1")
             change = changes[0] if changes else None
-            yield target, replace(given[source], place=where, keep_unit=keep, transformation=change), True
-        self.ignored += [f"{one.place}: no entry in the mapping" for one in left.values()]
+            yield target, replace(given[source], where=where, keep_unit=keep, transformation=change), True
+        self.ignored += [f"{one.where}: no entry in the mapping" for one in left.values()]
 
-    def _content(self, element: Element, inline: Element, ending: str, place: str) -> tuple[Element, str]:
+    def _content(self, element: Element, inline: Element, ending: str, where: str) -> tuple[Element, str]:
         """The root of a set or mapping, of a file or inline, and how messages name where it is."""
         what, tag = {
             ".ssv": ("set", f"{{{SSV}}}ParameterSet"),
@@ -251,24 +251,24 @@ class _Bindings:
         }[ending]
         expected = f"application/x-ssp-parameter-{what}"
         if element.get("type", expected) != expected:
-            raise UnitFileError(f"{place}: is of type {quoted(element.get('type'))}; expected {expected}.")
+            raise UnitFileError(f"{where}: is of type {quoted(element.get('type'))}; expected {expected}.")
         if element.get("sourceBase", "SSD") != "SSD":
             raise UnitFileError(
-                f"{place}: its sourceBase is a component; expected SSD. Put the file into the package."
+                f"{where}: its sourceBase is a component; expected SSD. Put the file into the package."
             )
         source = element.get("source")
         inside = [] if inline is None else [e for e in inline if isinstance(e.tag, str)]
         if (source is None) != bool(inside):
             stated = "has no source and no" if source is None else "states a source and a"
-            raise UnitFileError(f"{place}: {stated} {what} inline; expected one of both.")
+            raise UnitFileError(f"{where}: {stated} {what} inline; expected one of both.")
         if source is None:
-            root, file = inside[0], place
+            root, file = inside[0], where
         else:
             try:
                 root, file = xml_of(self._read(source), source), quoted(source)
             except KeyError:
                 raise UnitFileError(
-                    f"{place}: no file '{quoted(source)}' in the package; expected one by its path there."
+                    f"{where}: no file '{quoted(source)}' in the package; expected one by its path there."
                 ) from None
         problems = schema_problems(root, ending, file)
         if root.tag != tag or len(inside) > 1:
@@ -278,12 +278,12 @@ class _Bindings:
         return root, file
 
 
-def _given(parameter: Element, units: Sequence[Element], place: str) -> Given:
+def _given(parameter: Element, units: Sequence[Element], where: str) -> Given:
     """A parameter of a set that keeps the schema; `units` are the elements whose unit definitions count."""
     stated = next(e for e in parameter if isinstance(e.tag, str))
     kind, text = etree.QName(stated).localname, stated.get("value")
     if kind == "Binary":
-        raise UnitFileError(f"{place}: is binary, which no unit of FMI 2.0 takes. Leave it out.")
+        raise UnitFileError(f"{where}: is binary, which no unit of FMI 2.0 takes. Leave it out.")
     value: Value = text
     if kind == "Real":
         value = float(text)
@@ -295,10 +295,10 @@ def _given(parameter: Element, units: Sequence[Element], place: str) -> Given:
     return Given(
         kind,
         value,
-        place,
+        where,
         unit,
         _base(unit, units),
-        _numbers(enumeration, units, place) if enumeration else None,
+        _numbers(enumeration, units, where) if enumeration else None,
     )
 
 
@@ -317,40 +317,40 @@ def _base(unit: str | None, units: Sequence[Element]) -> BaseUnit | None:
     return BaseUnit(**exponents, factor=float(stated.get("factor", 1)), offset=float(stated.get("offset", 0)))
 
 
-def _numbers(name: str, units: Sequence[Element], place: str) -> dict[str, int]:
+def _numbers(name: str, units: Sequence[Element], where: str) -> dict[str, int]:
     definition = _named(units, "Enumeration", name)
     if definition is None:
-        raise UnitFileError(f"{place}: no enumeration '{quoted(name)}' in its file. Define it there.")
+        raise UnitFileError(f"{where}: no enumeration '{quoted(name)}' in its file. Define it there.")
     return {item.get("name"): int(item.get("value")) for item in definition.iterfind(f"{{{SSC}}}Item")}
 
 
-def _targets(node: Node, name: str, place: str) -> list[tuple[Node, str]]:
+def _targets(node: Node, name: str, where: str) -> list[tuple[Node, str]]:
     """Components and variables that a hierarchical name within an element means; none where no variable has it."""
     if node.description is not None:
         known = any(v.name == name for v in node.description.modelVariables)
         return [(node, name)] if known else []
     for connector in node.element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector"):
         if connector.get("name") == name:
-            return _behind(node, connector, place)
+            return _behind(node, connector, where)
     # Names of elements may have dots, so that there may be several ways to split one.
     ways = [
         found
         for element, below in node.nodes.items()
-        if name.startswith(f"{element}.") and (found := _targets(below, name[len(element) + 1 :], place))
+        if name.startswith(f"{element}.") and (found := _targets(below, name[len(element) + 1 :], where))
     ]
     if len(ways) > 1:
         raise UnitFileError(
-            f"{place}: '{quoted(name)}' means variables of two elements. Name the elements otherwise."
+            f"{where}: '{quoted(name)}' means variables of two elements. Name the elements otherwise."
         )
     return ways[0] if ways else []
 
 
-def _behind(node: Node, connector: Element, place: str) -> list[tuple[Node, str]]:
+def _behind(node: Node, connector: Element, where: str) -> list[tuple[Node, str]]:
     """The variables that a system's connector hands its value to."""
     name = connector.get("name")
     if connector.get("kind") != "parameter":
         raise UnitFileError(
-            f"{place}: sets the connector '{quoted(name)}' of {node.place}, which is of kind "
+            f"{where}: sets the connector '{quoted(name)}' of {node.where}, which is of kind "
             f"{quoted(connector.get('kind'))}; expected a parameter. Set the variable of the element behind it."
         )
     found: list[tuple[Node, str]] = []
@@ -358,7 +358,7 @@ def _behind(node: Node, connector: Element, place: str) -> list[tuple[Node, str]
         if connection.get("startElement") is None and connection.get("startConnector") == name:
             end = node.nodes.get(connection.get("endElement"))
             if end is not None:
-                found += _targets(end, connection.get("endConnector"), place)
+                found += _targets(end, connection.get("endConnector"), where)
     return found
 
 
@@ -366,7 +366,7 @@ def _converted(given: Given, owner: Node, name: str) -> Value:
     """A value for a variable: its unit converted, then the mapping's transformation; raises UnitFileError."""
     assert owner.description is not None
     variable = next(v for v in owner.description.modelVariables if v.name == name)
-    at = f"{given.place}: for '{quoted(name)}' of {owner.place}"
+    at = f"{given.where}: for '{quoted(name)}' of {owner.where}"
     settable = variable.causality in ("parameter", "input") or variable.initial in ("exact", "approx")
     if not settable or variable.variability == "constant":
         raise UnitFileError(

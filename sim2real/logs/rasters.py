@@ -21,6 +21,9 @@ SLOW_STEP_S = 0.05
 TIME_SYNC = 1
 """MDF's number for a master channel that is time (2 is angle, 3 distance, 4 index)."""
 
+UNEVEN_SHARE = 0.05
+"""Share of the base's steps off by more than half a step from which on its times are no clock [-]."""
+
 
 @dataclass(frozen=True)
 class Channel:
@@ -79,8 +82,8 @@ def table_of(
 ) -> Table:
     """The wanted channels on the times of the first wheel speed; its rows are samples and count from 1.
 
-    Faster channels are averaged over a sample of the base, slower ones interpolated, classes held. The master channels
-    go by their own names and by time_s.
+    Faster channels are averaged over a sample of the base, slower ones interpolated, classes held. Where the base comes
+    unevenly, its median step makes even times. The master channels go by their own names and by time_s.
 
     Parameters
     ----------
@@ -108,9 +111,20 @@ def table_of(
     time_s = np.asarray(channels[base].time_s, dtype=np.float64)
     if len(time_s) < 2:
         raise LogError(f"{path}: channel {base} has fewer than two samples; expected one per time.")
-    numbers: dict[str, Array] = {n: time_s for n in (*masters, TIME) if n in wanted.numbers}
     text: dict[str, Text] = {}
     findings: list[Finding] = []
+    step = median_step(time_s)
+    uneven = np.count_nonzero(np.abs(np.diff(time_s) - step) > 0.5 * step)
+    if uneven > UNEVEN_SHARE * len(time_s) and np.all(np.diff(time_s) > 0.0):
+        time_s = np.arange(time_s[0], time_s[-1], step)
+        findings.append(
+            Finding(
+                f"channel {base} comes unevenly: {uneven} of its samples are more than half a step ({500.0 * step:.3g} "
+                f"ms) off. All channels are interpolated onto an even {1.0 / step:.4g} Hz.",
+                fatal=False,
+            )
+        )
+    numbers: dict[str, Array] = {n: time_s for n in (*masters, TIME) if n in wanted.numbers}
     for name, channel in channels.items():
         problem = _problem(name, channel, wanted, time_s)
         if problem:
