@@ -54,7 +54,7 @@ class Given:
 
     kind: str
     value: Value
-    where: str
+    origin: str
     unit: str | None = None
     base: BaseUnit | None = None
     numbers: Mapping[str, int] | None = None
@@ -74,7 +74,7 @@ class Node:
     description: ModelDescription | None = None
 
     @property
-    def where(self) -> str:
+    def origin(self) -> str:
         """The element as messages name it."""
         return f"{STRUCTURE}, element '{quoted('.'.join(self.path) or self.element.get('name'))}'"
 
@@ -163,23 +163,23 @@ def bound_values(
 
 def _node(element: Element, path: tuple[str, ...], describe: Callable[[str], ModelDescription]) -> Node:
     nodes: dict[str, Node] = {}
-    where = Node(element, path, nodes).where
+    origin = Node(element, path, nodes).origin
     for child in element.iterfind(f"{{{SSD}}}Elements/*"):
         name = child.get("name")
         if child.tag not in (f"{{{SSD}}}System", f"{{{SSD}}}Component"):
             if child.find(f"{{{SSD}}}ParameterBindings") is not None:
                 raise UnitFileError(
-                    f"{where}: its element '{quoted(name)}' has no parameters. Leave out its bindings."
+                    f"{origin}: its element '{quoted(name)}' has no parameters. Leave out its bindings."
                 )
             continue
         if name in nodes:
-            raise UnitFileError(f"{where}: has two elements '{quoted(name)}'. Name each once.")
+            raise UnitFileError(f"{origin}: has two elements '{quoted(name)}'. Name each once.")
         nodes[name] = _node(child, (*path, name), describe)
     if element.tag == f"{{{SSD}}}System":
         return Node(element, path, nodes)
     if (kind := element.get("type", UNIT_TYPE)) != UNIT_TYPE:
         raise UnitFileError(
-            f"{where}: is of type {quoted(kind)}; expected {UNIT_TYPE}. Put the units of that package into this one."
+            f"{origin}: is of type {quoted(kind)}; expected {UNIT_TYPE}. Put the units of that package into this one."
         )
     return Node(element, path, nodes, describe(element.get("source")))
 
@@ -196,23 +196,23 @@ class _Bindings:
         for below in node.nodes.values():
             yield from self.of(below)
         for number, binding in enumerate(node.element.findall(f"{{{SSD}}}ParameterBindings/*"), 1):
-            where = f"{node.where}, ParameterBinding {number}"
-            for target, given, must in self._mapped(binding, where):
-                found = _targets(node, target, given.where)
+            origin = f"{node.origin}, ParameterBinding {number}"
+            for target, given, must in self._mapped(binding, origin):
+                found = _targets(node, target, given.origin)
                 if not found and must:
                     raise UnitFileError(
-                        f"{given.where}: its target '{quoted(target)}' is no variable of {node.where}. Name a "
+                        f"{given.origin}: its target '{quoted(target)}' is no variable of {node.origin}. Name a "
                         "variable of a unit, after the names of the elements around it."
                     )
                 if not found:
-                    self.ignored.append(f"{given.where}: '{target}'")
+                    self.ignored.append(f"{given.origin}: '{target}'")
                 for owner, name in found:
                     yield (owner.path, name), _converted(given, owner, name)
 
-    def _mapped(self, binding: Element, where: str) -> Iterator[tuple[str, Given, bool]]:
+    def _mapped(self, binding: Element, origin: str) -> Iterator[tuple[str, Given, bool]]:
         """Targets and what is given to them, and whether the target is the mapping's own word."""
         prefix = binding.get("prefix", "")
-        root, file = self._content(binding, binding.find(f"{{{SSD}}}ParameterValues"), ".ssv", where)
+        root, file = self._content(binding, binding.find(f"{{{SSD}}}ParameterValues"), ".ssv", origin)
         units = [root] if binding.get("source") else [root, self._structure]
         given: dict[str, Given] = {}
         for parameter in root.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
@@ -225,7 +225,7 @@ class _Bindings:
         if mapping is None:
             yield from ((name, one, False) for name, one in given.items())
             return
-        root, file = self._content(mapping, mapping, ".ssm", f"{where}, ParameterMapping")
+        root, file = self._content(mapping, mapping, ".ssm", f"{origin}, ParameterMapping")
         left, targets = dict(given), set()
         for entry in root.iterfind(f"{{{SSM}}}MappingEntry"):
             source, target = entry.get("source"), entry.get("target")
@@ -240,10 +240,10 @@ class _Bindings:
             changes = [e for e in entry if e.tag in {f"{{{SSC}}}{name}" for name in TRANSFORMATIONS}]
             keep = entry.get("suppressUnitConversion") in ("true", "1")
             change = changes[0] if changes else None
-            yield target, replace(given[source], where=where, keep_unit=keep, transformation=change), True
-        self.ignored += [f"{one.where}: no entry in the mapping" for one in left.values()]
+            yield target, replace(given[source], origin=where, keep_unit=keep, transformation=change), True
+        self.ignored += [f"{one.origin}: no entry in the mapping" for one in left.values()]
 
-    def _content(self, element: Element, inline: Element, ending: str, where: str) -> tuple[Element, str]:
+    def _content(self, element: Element, inline: Element, ending: str, origin: str) -> tuple[Element, str]:
         """The root of a set or mapping, of a file or inline, and how messages name where it is."""
         what, tag = {
             ".ssv": ("set", f"{{{SSV}}}ParameterSet"),
@@ -251,24 +251,24 @@ class _Bindings:
         }[ending]
         expected = f"application/x-ssp-parameter-{what}"
         if element.get("type", expected) != expected:
-            raise UnitFileError(f"{where}: is of type {quoted(element.get('type'))}; expected {expected}.")
+            raise UnitFileError(f"{origin}: is of type {quoted(element.get('type'))}; expected {expected}.")
         if element.get("sourceBase", "SSD") != "SSD":
             raise UnitFileError(
-                f"{where}: its sourceBase is a component; expected SSD. Put the file into the package."
+                f"{origin}: its sourceBase is a component; expected SSD. Put the file into the package."
             )
         source = element.get("source")
         inside = [] if inline is None else [e for e in inline if isinstance(e.tag, str)]
         if (source is None) != bool(inside):
             stated = "has no source and no" if source is None else "states a source and a"
-            raise UnitFileError(f"{where}: {stated} {what} inline; expected one of both.")
+            raise UnitFileError(f"{origin}: {stated} {what} inline; expected one of both.")
         if source is None:
-            root, file = inside[0], where
+            root, file = inside[0], origin
         else:
             try:
                 root, file = xml_of(self._read(source), source), quoted(source)
             except KeyError:
                 raise UnitFileError(
-                    f"{where}: no file '{quoted(source)}' in the package; expected one by its path there."
+                    f"{origin}: no file '{quoted(source)}' in the package; expected one by its path there."
                 ) from None
         problems = schema_problems(root, ending, file)
         if root.tag != tag or len(inside) > 1:
@@ -278,12 +278,12 @@ class _Bindings:
         return root, file
 
 
-def _given(parameter: Element, units: Sequence[Element], where: str) -> Given:
+def _given(parameter: Element, units: Sequence[Element], origin: str) -> Given:
     """A parameter of a set that keeps the schema; `units` are the elements whose unit definitions count."""
     stated = next(e for e in parameter if isinstance(e.tag, str))
     kind, text = etree.QName(stated).localname, stated.get("value")
     if kind == "Binary":
-        raise UnitFileError(f"{where}: is binary, which no unit of FMI 2.0 takes. Leave it out.")
+        raise UnitFileError(f"{origin}: is binary, which no unit of FMI 2.0 takes. Leave it out.")
     value: Value = text
     if kind == "Real":
         value = float(text)
@@ -295,10 +295,10 @@ def _given(parameter: Element, units: Sequence[Element], where: str) -> Given:
     return Given(
         kind,
         value,
-        where,
+        origin,
         unit,
         _base(unit, units),
-        _numbers(enumeration, units, where) if enumeration else None,
+        _numbers(enumeration, units, origin) if enumeration else None,
     )
 
 
@@ -317,40 +317,40 @@ def _base(unit: str | None, units: Sequence[Element]) -> BaseUnit | None:
     return BaseUnit(**exponents, factor=float(stated.get("factor", 1)), offset=float(stated.get("offset", 0)))
 
 
-def _numbers(name: str, units: Sequence[Element], where: str) -> dict[str, int]:
+def _numbers(name: str, units: Sequence[Element], origin: str) -> dict[str, int]:
     definition = _named(units, "Enumeration", name)
     if definition is None:
-        raise UnitFileError(f"{where}: no enumeration '{quoted(name)}' in its file. Define it there.")
+        raise UnitFileError(f"{origin}: no enumeration '{quoted(name)}' in its file. Define it there.")
     return {item.get("name"): int(item.get("value")) for item in definition.iterfind(f"{{{SSC}}}Item")}
 
 
-def _targets(node: Node, name: str, where: str) -> list[tuple[Node, str]]:
+def _targets(node: Node, name: str, origin: str) -> list[tuple[Node, str]]:
     """Components and variables that a hierarchical name within an element means; none where no variable has it."""
     if node.description is not None:
         known = any(v.name == name for v in node.description.modelVariables)
         return [(node, name)] if known else []
     for connector in node.element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector"):
         if connector.get("name") == name:
-            return _behind(node, connector, where)
+            return _behind(node, connector, origin)
     # Names of elements may have dots, so that there may be several ways to split one.
     ways = [
         found
         for element, below in node.nodes.items()
-        if name.startswith(f"{element}.") and (found := _targets(below, name[len(element) + 1 :], where))
+        if name.startswith(f"{element}.") and (found := _targets(below, name[len(element) + 1 :], origin))
     ]
     if len(ways) > 1:
         raise UnitFileError(
-            f"{where}: '{quoted(name)}' means variables of two elements. Name the elements otherwise."
+            f"{origin}: '{quoted(name)}' means variables of two elements. Name the elements otherwise."
         )
     return ways[0] if ways else []
 
 
-def _behind(node: Node, connector: Element, where: str) -> list[tuple[Node, str]]:
+def _behind(node: Node, connector: Element, origin: str) -> list[tuple[Node, str]]:
     """The variables that a system's connector hands its value to."""
     name = connector.get("name")
     if connector.get("kind") != "parameter":
         raise UnitFileError(
-            f"{where}: sets the connector '{quoted(name)}' of {node.where}, which is of kind "
+            f"{origin}: sets the connector '{quoted(name)}' of {node.origin}, which is of kind "
             f"{quoted(connector.get('kind'))}; expected a parameter. Set the variable of the element behind it."
         )
     found: list[tuple[Node, str]] = []
@@ -358,7 +358,7 @@ def _behind(node: Node, connector: Element, where: str) -> list[tuple[Node, str]
         if connection.get("startElement") is None and connection.get("startConnector") == name:
             end = node.nodes.get(connection.get("endElement"))
             if end is not None:
-                found += _targets(end, connection.get("endConnector"), where)
+                found += _targets(end, connection.get("endConnector"), origin)
     return found
 
 
@@ -366,7 +366,7 @@ def _converted(given: Given, owner: Node, name: str) -> Value:
     """A value for a variable: its unit converted, then the mapping's transformation; raises UnitFileError."""
     assert owner.description is not None
     variable = next(v for v in owner.description.modelVariables if v.name == name)
-    at = f"{given.where}: for '{quoted(name)}' of {owner.where}"
+    at = f"{given.origin}: for '{quoted(name)}' of {owner.origin}"
     settable = variable.causality in ("parameter", "input") or variable.initial in ("exact", "approx")
     if not settable or variable.variability == "constant":
         raise UnitFileError(
