@@ -108,12 +108,15 @@ def one_per_message(path: Path, table: Table, time_s: Array, wanted: Wanted) -> 
 
 
 def _apart(new: Mapping[str, NDArray[np.bool_]], base: NDArray[np.bool_]) -> bool:
-    """Whether some signal has new cells in other rows than the base, and both have enough of them."""
-    counts = [(np.count_nonzero(there), np.count_nonzero(there & base)) for there in new.values()]
-    enough = [(own, both) for own, both in counts if own >= MESSAGES]
-    return bool(np.count_nonzero(base) >= MESSAGES) and any(
-        both <= MOST_OUT_OF_ORDER * own for own, both in enough
-    )
+    """Whether some signal has new cells between the base's, in other rows, and both have enough of them."""
+    if np.count_nonzero(base) < MESSAGES:
+        return False
+    first, last = np.flatnonzero(base)[[0, -1]]
+    between = slice(first, last + 1)
+    counts = [
+        (np.count_nonzero(x[between]), np.count_nonzero(x[between] & base[between])) for x in new.values()
+    ]
+    return any(own >= MESSAGES and both <= MOST_OUT_OF_ORDER * own for own, both in counts)
 
 
 def _changed(values: Array) -> NDArray[np.bool_]:

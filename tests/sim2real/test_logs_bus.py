@@ -11,6 +11,7 @@ import pytest
 from asammdf import MDF, Signal
 from bus_maker import DBC, MAPPING, NONE, QUANTUM, WRITERS, described, frames_of, write
 from log_maker import make_frame
+from long import beyond
 from typer.testing import CliRunner
 
 import trpac
@@ -365,7 +366,7 @@ def test_damage_is_a_clean_error_or_a_log(tmp_path, short, monkeypatch, capfd, s
     assert capfd.readouterr().err == ""
 
 
-@pytest.mark.parametrize("suffix", [suffix for suffix in WRITERS if suffix != ".mf4"])
+@pytest.mark.parametrize("suffix", beyond(2, [".log", ".asc", ".trc", ".blf"]))
 def test_200_damaged_files(tmp_path, short, monkeypatch, suffix):
     """The same without a process for each: python-can raises, and does not crash as the reader of MDF may."""
 

@@ -16,7 +16,7 @@ LINES = lines_of(FRAME)
 RAW = ("\n".join(LINES) + "\n").encode()
 NUMBERS = FRAME.drop(columns="image_path").to_numpy(dtype=float)
 
-SAME_FILE = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150)
+SAME_FILE = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=80)
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from asammdf import MDF
 from fmu_unit import Unit as Client
-from long import long
+from long import beyond, long
 from typer.testing import CliRunner
 
 from fmu_src.kinds import KINDS, PYTHON
@@ -107,7 +107,7 @@ def replayed(archive: Path, parameters: dict[str, object], log: dict[str, np.nda
     return np.array(results)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", beyond(1, KINDS))
 def test_what_is_on_the_bus_is_what_fmpy_gives_for_the_same_inputs(
     kind: str, unit_file: Path, tmp_path: Path
 ) -> None:
@@ -239,7 +239,7 @@ def test_what_cannot_be_used_is_refused_in_one_line(
     assert not list(tmp_path.glob("out/*"))
 
 
-@pytest.mark.parametrize("name", ["camera", "recorder", "plant"])
+@pytest.mark.parametrize("name", beyond(1, ["recorder", "camera", "plant"]))
 def test_a_process_that_dies_ends_the_run_with_a_summary_and_an_exit_code_of_its_own(
     name: str, unit_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -405,11 +405,17 @@ def workplace(kind: Kind) -> Iterator[tuple[Path, bytes, Any]]:
         yield good, good.read_bytes(), kind.read(good)
 
 
+FORKED = {
+    f"log_{kind}" for kind in ("mf4", "blf", "asc", "candump", "trc", "bus_mf4", "dbc", "mat5", "mat73")
+}
+"""Kinds whose readers run in processes of their own."""
+
+
 def damaged_files(name: str, seed: int, numbers: range) -> Iterator[tuple[int, str | None]]:
     """Number and finding of each damaged file; the file of a number depends on the seed alone."""
     kind = KINDS[name]
     with (
-        forked_readers() if name.startswith("log_") else nullcontext(),
+        forked_readers() if name in FORKED else nullcontext(),
         workplace(kind) as (path, good, right),
     ):
         for number in numbers:
