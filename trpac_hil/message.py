@@ -1,4 +1,8 @@
-"""A message of the bus: bytes to values by signal name, and back, by the layout of a DBC file."""
+"""A message of the bus: bytes to values by signal name, and back, by the layout of a DBC file.
+
+The bits are taken here and not by cantools' `decode`, which refuses a message whose page (multiplexer value) the file
+does not describe, whatever else is in it, and computes all signals, used or not. Tests hold the two to each other.
+"""
 
 from __future__ import annotations
 

@@ -169,11 +169,12 @@ def decoded(
     raws: list[list[float]] = [[] for _ in signals]
     names = [signal.name for signal in signals]
     ends = np.cumsum(frames.lengths, dtype=np.int64).tolist()
-    widths, data = frames.lengths.tolist(), frames.data
+    widths, data, undescribed = frames.lengths.tolist(), frames.data, 0
     for i in np.flatnonzero(right).tolist():
         try:
             found = message.decode(data[ends[i] - widths[i] : ends[i]], decode_choices=False, scaling=False)
         except DecodeError:  # a branch of the multiplexer that the file does not describe
+            undescribed += 1
             continue
         except DAMAGE as error:
             text = f"message {message.name} cannot be decoded: {quoted(error)}; expected another DBC file."
@@ -182,6 +183,12 @@ def decoded(
             if (raw := found.get(name)) is not None:  # type: ignore[union-attr]
                 rows[k].append(i)
                 raws[k].append(float(raw))  # type: ignore[arg-type]
+    if undescribed and not all(signal.multiplexer_ids for signal in signals):
+        text = (
+            f"message {message.name}: {undescribed} frames have a multiplexer that the DBC file does not describe; "
+            "their other signals are lost samples."
+        )
+        findings.append(Finding(text, fatal=False))
     channels = {}
     for k, signal in enumerate(signals):
         time_s = frames.time_s[rows[k]]

@@ -68,6 +68,21 @@ def test_every_format_reads_back(tmp_path, frame, mapping, suffix):
     assert log.ignored == ("Page.Which", "Page.Steer", "Page.Yaw")
 
 
+def test_frames_of_a_page_that_is_not_described_are_told(tmp_path, frame, mapping):
+    messages = frames_of(frame)
+    pages = [message for message in messages if message.arbitration_id == 259]
+    for message in pages[::10]:
+        message.data[0] = 7
+    dbc = described(tmp_path, "".join(line for line in DBC.splitlines(True) if " Yaw m1 " not in line))
+    page = mapped(tmp_path, yaw_rate_rad_s="{column: Page.Which, unit: rad/s}")
+    log = read_log(write(tmp_path / "log.blf", messages), page, dbc)
+    (told,) = (text for text in log.warnings if "multiplexer" in text)
+    undescribed = sum(message.data[0] != 0 for message in pages)
+    assert told.startswith(
+        f"message Page: {undescribed} frames have a multiplexer that the DBC file does not"
+    )
+
+
 def test_what_a_multiplexer_carries_has_its_own_times(tmp_path, frame):
     mapping = mapped(tmp_path, steering_angle_rad="Steer", yaw_rate_rad_s="Page.Yaw")
     log = read_log(write(tmp_path / "log.blf", frames_of(frame)), mapping, described(tmp_path))
