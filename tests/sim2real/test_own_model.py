@@ -11,6 +11,7 @@ import yaml
 from foreign_unit import SIGNALS, command, foreign_unit, recorded
 from gap_drives import DRY, clean, noisy, pulses
 from gap_files import write_log, write_road
+from long import long
 
 import sim2real.own_model.runs as own_runs
 import trpac
@@ -225,6 +226,7 @@ def ask(folder, car, unit, run, **more):
     )
 
 
+@long
 def test_a_sound_foreign_car_has_no_gap_to_its_own_model(folder, car, unit):
     said = ask(folder, car, unit, Run(log()))
     assert said.verdict is Verdict.NO_GAP
