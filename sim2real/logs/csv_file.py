@@ -87,7 +87,8 @@ def read_csv(path: Path, wanted: Wanted, stated: Format, progress: Progress) -> 
                 if len(bad) > 0.5 * len(cells) or "%" in wanted.time_form:
                     times = times_of_texts(_told(cells), wanted.time_form)
                     lost = np.flatnonzero(np.isnan(times.time_s))
-                    values, bad = times.time_s, [(int(k), str(cells[int(k)])) for k in lost]
+                    texts = [(int(k), str(cells[int(k)])) for k in lost]
+                    values, bad = times.time_s, [one for one in texts if one[1].lower() not in MISSING]
                     units[name] = "s"
                     notes.append(f"time as {times.note}")
             elif bad and name in wanted.identifiers and len(bad) == len(cells) - _lost(cells):
@@ -96,7 +97,7 @@ def read_csv(path: Path, wanted: Wanted, stated: Format, progress: Progress) -> 
             findings.append(_bad_cells(name, bad, rows, name == wanted.time))
         else:
             numbers[name] = values
-    if not found.ends:
+    if not found.ends and len(rows):
         findings.append(
             Finding(
                 f"row {rows[-1]} ends the file without a line break; if the recording was cut off, look at it.",
@@ -293,7 +294,7 @@ def _row_numbers(path: Path, dialect: Dialect, found: _Found) -> tuple[NDArray[n
             f"{quoted(path)}: its rows cannot be told apart; expected one line per sample without stray quotes."
         )
     findings = []
-    if ragged and not found.ends and ragged[-1][0] > rows[-1] and ragged[-1][1] < width:
+    if rows and ragged and not found.ends and ragged[-1][0] > rows[-1] and ragged[-1][1] < width:
         findings.append(Finding(f"row {ragged.pop()[0]}, the last, is cut off; it is left out.", fatal=False))
     if ragged:
         shown = ", ".join(f"row {row} ({cells})" for row, cells in ragged[:SHOWN])

@@ -228,6 +228,7 @@ class TestRefusals:
             (b"\x00\x01\x02\x00\x80\x00", "expected"),
             (b"1,2\n3,4\n", "row 1 holds numbers in 2 columns, and no row above it"),
             (b"time_s,position_m\n1,2,3\n", "row 2 (3): not as many cells"),
+            (b"time_s,position_m\n1,2,3", "row 2 (3): not as many cells"),
             (b"a;b\n1,234;2\n2,345;3\n", "may be a decimal comma or one between thousands"),
         ],
     )

@@ -163,6 +163,13 @@ class TestTimes:
         assert_same(log, frame)
         assert log.notes == ("time as ISO 8601, from the first row on",)
 
+    def test_a_cell_without_a_time_is_a_row_left_out(self, read, frame):
+        stamps = pd.Timestamp("2024-05-03") + pd.to_timedelta(frame["time_s"], unit="s").dt.round("us")
+        texts = stamps.dt.strftime("%Y-%m-%d %H:%M:%S.%f").mask(frame.index == 7, "")
+        log = read(frame.assign(time_s=texts).to_csv(index=False))
+        assert log.warnings[0] == "column time_s: row 9 has no time; left out."
+        assert np.array_equal(log.signals["position_m"], frame["position_m"].drop(7))
+
     @pytest.mark.parametrize("start", ["12:34:58.5", "12:59:59", "23:59:58.9"])
     @pytest.mark.parametrize("form", ["%H%M%S.%f", "%H:%M:%S.%f"])
     def test_a_clock_over_a_minute_an_hour_and_midnight(self, read, frame, start, form):
