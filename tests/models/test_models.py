@@ -178,6 +178,7 @@ def test_rendered_worlds_never_seen_are_classified(surface, held_out):
     assert min(score.recall(label) for label in range(3)) >= 0.4, score.confusion
 
 
+@long
 def test_rendered_worlds_never_seen_are_segmented(segmenter, held_out):
     samples, _ = held_out
     ious, lit_as_shadow = [], []
