@@ -48,6 +48,14 @@ def test_the_column_that_is_off_is_told_from_those_that_agree(logs, column, fact
     assert said in " ".join(told(frame.assign(**{column: factor * frame[column]})))
 
 
+def test_torques_of_one_axle_may_differ_where_they_do_not_keep_a_factor(logs):
+    frame = logs[0]
+    t = frame["time_s"].to_numpy()
+    for side, torque in (("l", 200.0 * np.sin(t)), ("r", 80.0 * np.cos(1.3 * t))):
+        frame = frame.assign(**{f"wheel_torque_f{side}_nm": torque})
+    assert told(frame) == ()
+
+
 def curve(seconds=20.0, rate_hz=100.0, radius_m=0.3, track_m=1.5, wheelbase_m=2.7):
     """A drive through curves, with the signals of a car on them."""
     t = np.arange(round(seconds * rate_hz)) / rate_hz

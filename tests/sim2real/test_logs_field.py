@@ -341,6 +341,14 @@ class TestLostSamples:
         assert np.isfinite(trpac.read_log(hard).signals["wheel_speed_fl_rad_s"]).all()
         assert not any("lost" in text for text in trpac.read_log(hard).warnings)
 
+    def test_a_motor_at_its_limit_is_no_code_though_the_limit_looks_like_one(self, drive):
+        limited = drive.copy()
+        for w in WHEELS:
+            limited[f"wheel_torque_{w}_nm"] = np.clip(300.0 * np.sin(3.0 * TIME_S), -300.0, 255.0)
+        log = trpac.read_log(limited)
+        assert np.isfinite(log.signals["wheel_torque_fl_nm"]).all()
+        assert not any("lost" in text for text in log.warnings)
+
     def test_a_signal_that_is_impossible_for_long_is_refused(self, drive):
         with pytest.raises(LogError, match="accel_x_m_s2: 400 samples are no car's"):
             trpac.read_log(drive.assign(accel_x_m_s2=np.where(TIME_S < 2.0, 500.0, drive["accel_x_m_s2"])))

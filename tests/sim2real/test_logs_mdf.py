@@ -89,6 +89,22 @@ def test_the_units_that_it_states_are_converted_and_known_of_all_channels(tmp_pa
     assert understood(tmp_path / "log.mf4").table.units["Other"] == "bar"
 
 
+def test_a_raster_without_a_clock_comes_onto_an_even_rate(tmp_path, frame):
+    rng = np.random.default_rng(2)
+    time_s = frame["time_s"].to_numpy() + rng.uniform(0.0, 0.008, len(frame))
+    with MDF(version="4.10") as mdf:
+        for name in frame.columns.drop("time_s"):
+            mdf.append(Signal(frame[name].to_numpy(), time_s, name=name))
+        mdf.save(tmp_path / "log.mf4")
+    log = read_log(tmp_path / "log.mf4")
+    assert "channel wheel_speed_fl_rad_s comes unevenly" in log.warnings[0]
+    assert np.ptp(np.diff(log.time_s)) < 1e-9
+    known = np.isfinite(log.signals["position_m"])
+    assert known.mean() > 0.6
+    expected = np.interp(log.time_s, time_s, frame["position_m"])
+    assert np.allclose(log.signals["position_m"][known], expected[known], atol=0.05)
+
+
 def test_invalid_samples_are_lost_ones(tmp_path, frame):
     group = signals(frame)
     marks = np.zeros(len(frame), dtype=bool)

@@ -8,6 +8,8 @@ from log_maker import make_frame, save
 
 import trpac
 from sim2real.logs import load_mapping, read_log
+from sim2real.logs.proposal import candidates, proposed_mapping
+from sim2real.logs.table import Table
 
 WHEELS = {"fl": "VL", "fr": "VR", "rl": "HL", "rr": "HR"}
 GERMAN = {"time_s": "Zeit [s]", "vehicle_speed_m_s": "Geschw [km/h]", "accel_x_m_s2": "Beschl_x [m/s²]"}
@@ -60,6 +62,35 @@ def test_a_mapping_is_proposed_corrected_by_nobody_and_good(frame, german, tmp_p
     for name in set(log.signals) - {"position_m"}:
         assert np.allclose(log.signals[name], frame[name], rtol=1e-12), name
     assert cv2.imread(str(picture)).shape[0] > 500
+
+
+def test_a_column_is_proposed_for_its_own_wheel_and_quantity_alone(tmp_path):
+    names = (
+        "Time",
+        "Speed",
+        "Yaw angle",
+        "Motor torque limit FL",
+        "Wheel speed rear left",
+        "WhlTrqFR",
+        "pressure",
+    )
+    table = Table(
+        names,
+        {},
+        {},
+        np.arange(0),
+        units={"Speed": "km/h", "Wheel speed rear left": "km/h", "WhlTrqFR": "bar"},
+    )
+    found = {name: one.column for name, one in candidates(table).items()}
+    assert found == {
+        "time_s": "Time",
+        "vehicle_speed_m_s": "Speed",
+        "wheel_torque_fl_nm": "Motor torque limit FL",
+        "wheel_speed_rl_rad_s": "Wheel speed rear left",
+    }
+    text = proposed_mapping(table, "a.csv")
+    assert 'wheel_speed_rl_rad_s: {column: "Wheel speed rear left", radius_m: RADIUS}   # in km/h' in text
+    assert "  # wheel_torque_fr_nm: {column: NAME, unit: UNIT}   # no column found" in text
 
 
 def test_without_propose_the_mapping_is_shown_and_nothing_written(german, tmp_path):
