@@ -13,7 +13,7 @@ from pathlib import Path
 
 from sim2real.logs.errors import LogError
 from sim2real.logs.mapping import BLANKS, Format
-from sim2real.logs.table import MISSING, MOST_COLUMNS, split_unit
+from sim2real.logs.table import MOST_COLUMNS, split_unit
 from sim2real.logs.times import is_time
 from sim2real.logs.units import quantities
 from trpac_core.files import open_file, quoted
@@ -234,8 +234,7 @@ def _rows(
         unit, described = stated.unit_row, []
     else:
         unit = next((i + 1 for i in below if i < first and _are_units(rows[i], decimal)), 0)
-        words = [i for i in below if i < first and not counts[i] and len(rows[i]) == width]
-        described = [i for i in words if all(cell.lower() not in MISSING for cell in rows[i])]
+        described = [i for i in below if i < first and not counts[i] and len(rows[i]) == width]
     values = next((i for i in below if i >= max(header + 1, unit) and i not in described), len(rows))
     return header + 1, unit, values + 1
 
