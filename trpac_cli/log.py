@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.box import SIMPLE_HEAD
@@ -132,12 +132,14 @@ def check(
 def _show(console: Terminal, found: Understood) -> None:
     from sim2real.logs.inspection import column_reports
 
-    table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    for heading in ("column", "source", "unit", "factor", "rate [Hz]", "lost", "least", "greatest"):
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
+    for heading in ("column", "source", "unit", "factor", "Hz", "lost", "range"):
         left = heading in ("column", "source", "unit")
-        table.add_column(
-            heading, justify="left" if left else "right", no_wrap=heading != "source", overflow="fold"
-        )
+        justify: Literal["left", "right"] = "left" if left else "right"
+        if heading == "source":
+            table.add_column(heading, justify=justify, overflow="fold", min_width=10)
+        else:
+            table.add_column(heading, justify=justify, no_wrap=True)
     for column in column_reports(found):
         table.add_row(*_row(column))
     console.print(table)
@@ -151,6 +153,5 @@ def _row(column: ColumnReport) -> tuple[str, ...]:
         "" if math.isnan(column.factor) or column.factor == 1.0 else f"{column.factor:.6g}",
         f"{column.rate_hz:.4g}",
         f"{column.lost:.1%}" if column.lost else "",
-        f"{column.low:.5g}",
-        f"{column.high:.5g}",
+        f"{column.low:.4g} ... {column.high:.4g}",
     )

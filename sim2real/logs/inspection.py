@@ -14,7 +14,7 @@ from scenarios.whole_files import write_whole
 from sim2real.logs.contract import COLUMNS, POSITION, REQUIRED, TIME, WHEEL_SPEEDS
 from sim2real.logs.mapping import Spec
 from sim2real.logs.read import Understood
-from sim2real.logs.resampling import median_step
+from sim2real.logs.resampling import BROKEN, median_step
 from sim2real.logs.table import Array, read_as
 from trpac_core.vehicle import WHEELS
 
@@ -26,6 +26,8 @@ MOST_POINTS = 4_000
 COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7")
 """Okabe and Ito's, which colour-blind people tell apart; the wheels differ by their lines, too."""
 LINES = ("-", "--", "-.", ":")
+LOST_COLOUR, MOST_SHADED = "#d55e00", 50
+"""Shade behind stretches without a sample, and how many of a signal are shaded."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ def missing_for_diagnosis(log: Understood) -> list[str]:
 
 
 def draw(log: Understood, path: Path) -> None:
-    """Write a picture of the signals as PNG: speeds, torques, accelerations, each over time, lost rows shaded."""
+    """Write a picture of the signals as PNG: speeds, torques, accelerations, each over time, lost samples shaded."""
     from matplotlib.figure import Figure  # takes a second to load
 
     figure = Figure(figsize=(11.0, 9.0), layout="constrained")
@@ -112,14 +114,23 @@ def _curves(axes: Axes, log: Understood, labels: Mapping[str, str], name: str) -
     for k, key in enumerate(there):
         at, values = _thinned(log.time_s, log.signals[key])
         axes.plot(at, values, LINES[k], color=COLOURS[k], lw=1.1, label=labels[key])
-    for start, end in log.gaps:
-        axes.axvspan(start, end, color="0.85", lw=0)
+        for start, end in _lost(log.time_s, log.signals[key]):
+            axes.axvspan(start, end, color=LOST_COLOUR, alpha=0.25, lw=0)
     if there:
         axes.legend(
             loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=len(there), fontsize=8, frameon=False
         )
     else:
         axes.text(0.5, 0.5, "not in this log", transform=axes.transAxes, ha="center", color="0.4")
+
+
+def _lost(time_s: Array, values: Array) -> list[tuple[float, float]]:
+    """The longest stretches without a sample, by a signal's own rate."""
+    t = time_s[np.isfinite(values)]
+    step = np.diff(t)
+    at = np.flatnonzero(step > BROKEN * np.median(step)) if len(step) else np.zeros(0, dtype=np.intp)
+    longest = at[np.argsort(-step[at], kind="stable")[:MOST_SHADED]]
+    return [(float(t[i]), float(t[i + 1])) for i in longest]
 
 
 def _thinned(time_s: Array, values: Array) -> tuple[Array, Array]:
