@@ -304,14 +304,9 @@ def identifier(coded: Coded) -> str:
 def _invalid(signal: Signal) -> frozenset[float]:
     """Raw values that say that there is no value; raises ValueError where the signal's bits do not hold one."""
     invalid = no_value(signal)
-    if signal.is_float:
-        return invalid
-    values = 2**signal.length
-    # Some tools write the codes of signed signals as if they had no sign.
-    raws = {raw - values if signal.is_signed and values / 2 <= raw < values else raw for raw in invalid}
-    if not all(_holds(signal, raw) for raw in raws):
+    if not all(_holds(signal, raw) for raw in invalid):
         raise ValueError(f"{signal.name} has a value in its table that its bits do not hold")
-    return frozenset(raws)
+    return invalid
 
 
 def _counter(by_name: Mapping[str, Signal], stated: str) -> str:

@@ -81,12 +81,19 @@ def _text(data: bytes) -> str:
 
 
 def no_value(signal: Signal) -> frozenset[float]:
-    """Raw values of a signal that its value table names as "signal not available" (SNA), invalid or an error."""
-    return frozenset(
+    """Raw values of a signal that its value table names as "signal not available" (SNA), invalid or an error.
+
+    Some tools write the codes of a signed signal as if it had no sign: they are those of its bits.
+    """
+    codes = {
         float(raw)
         for raw, name in (signal.choices or {}).items()
         if _NO_VALUE.fullmatch(str(name).replace("_", " ").strip())
-    )
+    }
+    if signal.is_float or not signal.is_signed:
+        return frozenset(codes)
+    values = 2.0**signal.length
+    return frozenset(raw - values if values / 2.0 <= raw < values else raw for raw in codes)
 
 
 def _require_sizes(text: str) -> None:

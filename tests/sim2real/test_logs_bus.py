@@ -68,6 +68,17 @@ def test_every_format_reads_back(tmp_path, frame, mapping, suffix):
     assert log.ignored == ("Page.Which", "Page.Steer", "Page.Yaw")
 
 
+def test_codes_of_a_signed_signal_that_are_written_without_its_sign(tmp_path, frame, mapping):
+    messages = frames_of(frame)
+    motion = [message for message in messages if message.arbitration_id == 258]
+    for message in motion[50:57]:
+        message.data[4:6] = b"\xff\xfe"
+    dbc = described(tmp_path, DBC.replace("VAL_ 256", 'VAL_ 258 Ax 65534 "SNA" ;\nVAL_ 256', 1))
+    log = read_log(write(tmp_path / "log.blf", messages), mapping, dbc)
+    assert np.flatnonzero(np.isnan(log.signals["accel_x_m_s2"])).tolist() == list(range(50, 57))
+    assert "signal Motion.Ax: 7 of 301 samples are lost" in log.warnings[0]
+
+
 def test_frames_of_a_page_that_is_not_described_are_told(tmp_path, frame, mapping):
     messages = frames_of(frame)
     pages = [message for message in messages if message.arbitration_id == 259]
