@@ -95,11 +95,12 @@ def one_per_message(path: Path, table: Table, time_s: Array, wanted: Wanted) -> 
     for name, texts in table.text.items():
         at = np.flatnonzero(texts != "")
         channels[name] = Channel(time_s[at], texts[at])
-    made = table_of(path, table.names, (), channels, wanted)
+    made = table_of(path, table.names, (), {n: c for n, c in channels.items() if len(c.samples) > 1}, wanted)
+    lost = {name: np.full(len(made.rows), np.nan) for name in new if len(channels[name].samples) < 2}
     at = np.flatnonzero(np.isin(time_s, channels[wheels[0]].time_s) & new[wheels[0]])
     return replace(
         made,
-        numbers={**made.numbers, wanted.time: channels[wheels[0]].time_s},
+        numbers={**made.numbers, **lost, wanted.time: channels[wheels[0]].time_s},
         rows=table.rows[at] if len(at) == len(made.rows) else made.rows,
         findings=(*findings, *made.findings),
         units=table.units | {wanted.time: "s"},

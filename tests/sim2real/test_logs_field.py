@@ -237,6 +237,13 @@ class TestRowsOfMessages:
         assert np.array_equal(log.signals["vehicle_speed_m_s"], frame["vehicle_speed_m_s"][::2])
         assert np.allclose(log.signals["position_m"], frame["position_m"][::2], atol=1e-3, equal_nan=True)
 
+    @pytest.mark.parametrize("samples", [0, 1])
+    def test_a_column_that_is_empty_was_not_measured(self, read, frame, samples):
+        rows = self.rows(frame, shifts=(0.0003, 0.0007, 0.0)).assign(yaw_rate_rad_s=np.nan)
+        rows.iloc[:samples, -1] = 0.1
+        log = read(rows.to_csv(index=False))
+        assert log.warnings == ("column yaw_rate_rad_s has no value at all; it is taken as not measured.",)
+
     def test_with_the_other_cells_carried_forward(self, read, frame):
         rows = self.rows(frame, shifts=(0.0003, 0.0007, 0.0)).ffill().dropna()
         log = read(rows.to_csv(index=False))

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import can
 import cantools
 import numpy as np
+import pandas as pd
 import pytest
 from asammdf import MDF
 from hil_fakes import MS, FakeClock, unsaid
@@ -22,6 +23,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+import trpac
 from sim2real.logs.mapping import load_mapping
 from trpac_cli.main import app
 from trpac_hil.bus import BusSettings, Link
@@ -723,6 +725,37 @@ def test_a_foreign_car_drives_the_unit_and_the_recording_of_its_bus_says_the_sam
     known = log["vehicle_speed_m_s"][np.isfinite(log["vehicle_speed_m_s"])]
     assert np.isin(np.round(known * 360.0), np.round(np.array(speeds) * 360.0)).mean() > 0.99
     assert summary["bus_recording"]["rows"] > 4 * 600
+    # `trpac estimate` reads the recording by the same two files; cantools' own values as a table give the same.
+    table = decoded_rows(tmp_path / "bus.blf", database)
+    table.to_csv(tmp_path / "rows.csv", index=False)
+    found, expected = (
+        trpac.estimate(trpac.read_log(log, mapping=signals, dbc=file), "four_in_wheel_motor_ev").frame[
+            "TRPAC"
+        ]
+        for log, file in ((tmp_path / "bus.blf", dbc), (tmp_path / "rows.csv", None))
+    )
+    assert len(found) > 300
+    # Times since 1970 hold 0.2 us, which moves TRPAC by some 1e-6; its step in the message Estimate is 1e-4.
+    assert np.abs(found - expected).max() < 1e-4
+
+
+def decoded_rows(path: Path, database: cantools.database.Database) -> pd.DataFrame:
+    """A recording as a table of one row per message, units in the names, without what is not available."""
+    rows = []
+    with can.LogReader(path) as reader:
+        for message in reader:
+            try:
+                known = database.get_message_by_frame_id(message.arbitration_id)
+            except KeyError:
+                continue
+            values = known.decode(message.data, decode_choices=False)
+            rows.append({"time_s": message.timestamp} | {f"{known.name}.{s}": v for s, v in values.items()})
+    table = pd.DataFrame(rows)
+    table["time_s"] -= table["time_s"].iloc[0]
+    names = {f"{m.name}.{s.name}": s.unit for m in database.messages for s in m.signals if s.unit}
+    return table.assign(**{"Motion.YawRate": np.nan}).rename(
+        columns={n: f"{n} [{unit}]" for n, unit in names.items()}
+    )
 
 
 @pytest.mark.long
