@@ -9,8 +9,8 @@ from pathlib import Path
 from cantools.database.can import Message
 
 from sim2real.logs import mapping
-from sim2real.logs.dbc import DAMAGE, load_dbc
 from sim2real.logs.errors import LogError
+from sim2real.logs.formats.dbc import DAMAGE, load_dbc
 from trpac_core.files import quoted
 from trpac_hil.errors import HilError
 from trpac_hil.message import CLASSIC_BYTES, FD_SIZES, NO_COUNTER, Coded

@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 from cantools.database.can import Message, Signal
 
-from sim2real.logs.dbc import no_value
+from sim2real.logs.formats.dbc import no_value
 from trpac_core.files import quoted
 
 NOT_AVAILABLE = "not_available"
@@ -179,7 +179,7 @@ class Coded:
         counter: str = "",
         invalid: Mapping[str, Collection[float]] = NOTHING,
     ) -> Coded:
-        """The coding of a message of a DBC file; raises one of `sim2real.logs.dbc.DAMAGE`.
+        """The coding of a message of a DBC file; raises one of `sim2real.logs.formats.dbc.DAMAGE`.
 
         `used` are the signals to read or write, `counter` is the one that counts the messages: `NO_COUNTER` for none,
         empty for the one that is called so. `invalid` are values of signals that say that there is none, besides those
@@ -222,7 +222,7 @@ class Coded:
         )
 
     def try_out(self) -> None:
-        """Encode and decode some values; raises one of `sim2real.logs.dbc.DAMAGE` where that fails."""
+        """Encode and decode some values; raises one of `sim2real.logs.formats.dbc.DAMAGE` where that fails."""
         for name, (low, high) in self.bounds.items():
             if not -math.inf < low <= high < math.inf:
                 raise ValueError(f"{name} has no range")

@@ -11,15 +11,15 @@ import pandas as pd
 
 from sim2real.logs.agreement import check_agreement, check_wheels
 from sim2real.logs.checks import Clock, check_held, check_time, check_values
-from sim2real.logs.csv_file import read_csv
 from sim2real.logs.errors import LogError
-from sim2real.logs.frame_table import frame_sha256, frame_table
-from sim2real.logs.kinds import KINDS, kind_of
+from sim2real.logs.formats.csv_file import read_csv
+from sim2real.logs.formats.frame_table import frame_sha256, frame_table
+from sim2real.logs.formats.kinds import KINDS, kind_of
+from sim2real.logs.formats.mat_file import read_mat
+from sim2real.logs.formats.mdf_file import needs_dbc, read_mdf
+from sim2real.logs.formats.parquet_file import read_parquet
 from sim2real.logs.log import Log
 from sim2real.logs.mapping import NO_MAPPING, Mapping
-from sim2real.logs.mat_file import read_mat
-from sim2real.logs.mdf_file import needs_dbc, read_mdf
-from sim2real.logs.parquet_file import read_parquet
 from sim2real.logs.plausible import lost_samples, without_codes, without_stuck_codes
 from sim2real.logs.resampling import median_step
 from sim2real.logs.rows import in_order, one_per_message
@@ -241,7 +241,7 @@ def _read_table(
     if kind in KINDS or (kind == "MDF" and dbc):
         if not dbc:
             raise needs_dbc(path, kind)
-        from sim2real.logs.bus_file import read_bus  # cantools is an extra
+        from sim2real.logs.formats.bus_file import read_bus  # cantools is an extra
 
         return "sample", read_bus(path, kind, wanted, dbc)
     row_word, table = _read_named(path, kind, mapping, progress)

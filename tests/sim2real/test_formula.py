@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim2real.logs.formula import FUNCTIONS, FormulaError, evaluate
+from sim2real.logs.formats.formula import FUNCTIONS, FormulaError, evaluate
 
 X = np.array([0.5, 2.0, -3.0])
 

@@ -16,8 +16,9 @@ from typer.testing import CliRunner
 
 import trpac
 from scenarios.library import located
-from sim2real.logs import LogError, bus_file, bus_frames, extraction, load_mapping, read_log, write_log
-from sim2real.logs.bus_signals import Catalogue, Frames, decoded
+from sim2real.logs import LogError, load_mapping, read_log, write_log
+from sim2real.logs.formats import bus_file, bus_frames, extraction
+from sim2real.logs.formats.bus_signals import Catalogue, Frames, decoded
 from sim2real.sources import read_source
 from trpac_cli.main import app
 

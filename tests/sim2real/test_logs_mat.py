@@ -8,7 +8,8 @@ import pytest
 from log_maker import make_frame
 from scipy.io import savemat
 
-from sim2real.logs import LogError, extraction, load_mapping, read_log
+from sim2real.logs import LogError, load_mapping, read_log
+from sim2real.logs.formats import extraction
 
 NAMES = list(make_frame().columns)
 

@@ -13,8 +13,9 @@ import pytest
 from asammdf import MDF, Signal
 from log_maker import make_frame
 
-from sim2real.logs import LogError, extraction, load_mapping, mdf_file, read_log, write_log
-from sim2real.logs.extraction import EXTRACTOR
+from sim2real.logs import LogError, load_mapping, read_log, write_log
+from sim2real.logs.formats import extraction, mdf_file
+from sim2real.logs.formats.extraction import EXTRACTOR
 from sim2real.logs.read import understood
 from sim2real.logs.table import Wanted
 

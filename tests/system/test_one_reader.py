@@ -28,18 +28,18 @@ OPENED = {
     "fmu_src/trial.py": {
         "parse"
     },  # in a process that may die, of a unit that the reader of archives has unpacked
-    "sim2real/logs/parquet_file.py": {"ParquetFile", "read_schema"},  # behind the guard
-    "sim2real/logs/extractor.py": {
+    "sim2real/logs/formats/parquet_file.py": {"ParquetFile", "read_schema"},  # behind the guard
+    "sim2real/logs/formats/extractor.py": {
         "load",
         "fdopen",
         "read_text",
     },  # orders, answers and sizes of that process
-    "sim2real/logs/extraction.py": {"load", "loads"},  # the answer of the process that may die
-    "sim2real/logs/mdf_channels.py": {"open", "MDF"},  # in it
-    "sim2real/logs/bus_frames.py": {"open"},  # in it
-    "sim2real/logs/mat_variables.py": {"open", "loadmat", "File"},  # in it
-    "sim2real/logs/formula.py": {"parse"},  # to a syntax tree, of which arithmetic alone is evaluated
-    "sim2real/logs/dbc.py": {"load_string"},  # of the text that the guard has read
+    "sim2real/logs/formats/extraction.py": {"load", "loads"},  # the answer of the process that may die
+    "sim2real/logs/formats/mdf_channels.py": {"open", "MDF"},  # in it
+    "sim2real/logs/formats/bus_frames.py": {"open"},  # in it
+    "sim2real/logs/formats/mat_variables.py": {"open", "loadmat", "File"},  # in it
+    "sim2real/logs/formats/formula.py": {"parse"},  # to a syntax tree, of which arithmetic alone is evaluated
+    "sim2real/logs/formats/dbc.py": {"load_string"},  # of the text that the guard has read
 }
 """What reads files of others, and by which calls."""
 OWN = {

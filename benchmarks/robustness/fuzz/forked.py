@@ -18,8 +18,8 @@ READERS = ("mdf_channels", "bus_frames", "mat_variables")
 
 @contextmanager
 def forked_readers() -> Iterator[None]:
-    """While it lasts, `sim2real.logs.extraction` starts its readers so."""
-    from sim2real.logs import extraction, extractor
+    """While it lasts, `sim2real.logs.formats.extraction` starts its readers so."""
+    from sim2real.logs.formats import extraction, extractor
 
     for name in READERS:
         extractor.beside(name)

@@ -14,7 +14,8 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 from pyarrow import csv as arrow
 
-from sim2real.logs.dialect import (
+from sim2real.logs.errors import LogError
+from sim2real.logs.formats.dialect import (
     EXPECTED,
     LONGEST_LINE,
     MOST_BYTES,
@@ -24,7 +25,6 @@ from sim2real.logs.dialect import (
     is_number,
     open_text,
 )
-from sim2real.logs.errors import LogError
 from sim2real.logs.mapping import BLANKS, Format
 from sim2real.logs.table import (
     MISSING,

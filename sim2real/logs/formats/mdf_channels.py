@@ -1,7 +1,7 @@
-"""The channels of an MDF file, and its raw frames of a bus; a reader of `sim2real.logs.extractor`.
+"""The channels of an MDF file, and its raw frames of a bus; a reader of `sim2real.logs.formats.extractor`.
 
 asammdf hands a channel's conversion formula, text of the file's, to numexpr and SymPy, which run it as Python. So
-neither is there: in their place stands `sim2real.logs.formula`, which is arithmetic alone.
+neither is there: in their place stands `sim2real.logs.formats.formula`, which is arithmetic alone.
 """
 
 from __future__ import annotations

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from sim2real.logs.bus_signals import Catalogue, Described, Frames, decoded, merged, ordered
 from sim2real.logs.contract import COLUMNS, TIME
 from sim2real.logs.errors import LogError
-from sim2real.logs.extraction import Extract, extract
-from sim2real.logs.mdf_file import extract_mdf
+from sim2real.logs.formats.bus_signals import Catalogue, Described, Frames, decoded, merged, ordered
+from sim2real.logs.formats.extraction import Extract, extract
+from sim2real.logs.formats.mdf_file import extract_mdf
 from sim2real.logs.rasters import Channel, table_of
 from sim2real.logs.table import Finding, Table, Wanted
 

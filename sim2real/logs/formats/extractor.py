@@ -1,4 +1,4 @@
-"""A program that takes channels out of a file whose reader trusts it; started by `sim2real.logs.extraction`.
+"""A program that takes channels out of a file whose reader trusts it; started by `sim2real.logs.formats.extraction`.
 
 Readers of binary formats take addresses and sizes from the file: on damaged files they raise anything, print, unpack
 without end, and can crash the interpreter. In a process of its own, whose memory is bounded and which ends with its

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from sim2real.logs.errors import LogError
-from sim2real.logs.extraction import Extract, extract
+from sim2real.logs.formats.extraction import Extract, extract
 from sim2real.logs.rasters import table_of
 from sim2real.logs.table import Table, Wanted
 

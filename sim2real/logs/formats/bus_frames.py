@@ -1,4 +1,4 @@
-"""The raw frames of a bus log: BLF, ASC, candump, TRC; a reader of `sim2real.logs.extractor`."""
+"""The raw frames of a bus log: BLF, ASC, candump, TRC; a reader of `sim2real.logs.formats.extractor`."""
 
 from __future__ import annotations
 

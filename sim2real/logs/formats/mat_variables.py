@@ -1,4 +1,4 @@
-"""The signals of a MAT-file (versions 4, 5 and 7.3); a reader of `sim2real.logs.extractor`.
+"""The signals of a MAT-file (versions 4, 5 and 7.3); a reader of `sim2real.logs.formats.extractor`.
 
 Structs become names with points. A struct with a vector of times and one of values is one signal on its own times, as
 Simulink's "structure with time" is; any other vector is on the times of its struct, or of the struct around it. Nothing

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sim2real.logs.contract import COLUMNS, TIME
-from sim2real.logs.extraction import Extract, extract
+from sim2real.logs.formats.extraction import Extract, extract
 from sim2real.logs.rasters import Channel, table_of
 from sim2real.logs.table import Array, Finding, Table, Text, Wanted, labels_of, numbered
 from trpac_core.files import quoted

@@ -11,8 +11,8 @@ from cantools.database import DecodeError
 from cantools.database.can import Message, Signal
 from numpy.typing import NDArray
 
-from sim2real.logs.dbc import DAMAGE, load_dbc, no_value
 from sim2real.logs.errors import LogError
+from sim2real.logs.formats.dbc import DAMAGE, load_dbc, no_value
 from sim2real.logs.rasters import Channel
 from sim2real.logs.table import Array, Finding
 from trpac_core.files import quoted
