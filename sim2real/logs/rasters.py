@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sim2real.logs.contract import TIME
 from sim2real.logs.errors import LogError
-from sim2real.logs.resampling import DECIMATION, hold, last_index, median_step, onto
+from sim2real.logs.resampling import DECIMATION, SLOWEST_S, hold, last_index, median_step, onto
 from sim2real.logs.table import Array, Finding, Table, Text, Wanted, labels_of, numbered
 
 SLOW_STEP_S = 0.05
@@ -83,7 +83,7 @@ def table_of(
     """The wanted channels on the times of the first wheel speed; its rows are samples and count from 1.
 
     Faster channels are averaged over a sample of the base, slower ones interpolated, classes held. Where the base comes
-    unevenly, its median step makes even times. The master channels go by their own names and by time_s.
+    unevenly, its mean step makes even times. The master channels go by their own names and by time_s.
 
     Parameters
     ----------
@@ -115,7 +115,9 @@ def table_of(
     findings: list[Finding] = []
     step = median_step(time_s)
     uneven = np.count_nonzero(np.abs(np.diff(time_s) - step) > 0.5 * step)
-    if uneven > UNEVEN_SHARE * len(time_s) and np.all(np.diff(time_s) > 0.0):
+    is_uneven = bool(uneven > UNEVEN_SHARE * len(time_s) and np.all(np.diff(time_s) > 0.0))
+    if is_uneven:
+        step = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)  # the median is that of bursts
         time_s = np.arange(time_s[0], time_s[-1], step)
         findings.append(
             Finding(
@@ -133,7 +135,9 @@ def table_of(
             labels = ["", *channel.labels()]
             text[name] = labels_of([labels[i + 1] for i in last_index(channel.time_s, time_s)])
         else:
-            numbers[name] = _on_base(channel, time_s, name in wanted.held)
+            held = name in wanted.held
+            bridged = is_uneven and not held
+            numbers[name] = _bridged(channel, time_s) if bridged else _on_base(channel, time_s, held)
             findings += _slow(name, channel, time_s, name in wanted.held)
     return Table(every, numbers, text, np.arange(1, len(time_s) + 1), tuple(findings), units, notes)
 
@@ -161,6 +165,18 @@ def _on_base(channel: Channel, time_s: Array, held: bool) -> Array:
     if held:
         return hold(channel.time_s, values, time_s)
     return onto(channel.time_s, values, time_s, median_step(time_s))
+
+
+def _bridged(channel: Channel, time_s: Array) -> Array:
+    """A channel without a clock, as a line through its samples; lost where they are further apart than `SLOWEST_S`."""
+    values = channel.values()
+    known = np.isfinite(values)
+    own, values = channel.time_s[known], values[known]
+    if len(own) < 2:
+        return np.full(len(time_s), np.nan)
+    after = np.clip(np.searchsorted(own, time_s), 1, len(own) - 1)
+    lost = (time_s < own[0]) | (time_s > own[-1]) | (own[after] - own[after - 1] > SLOWEST_S)
+    return np.where(lost, np.nan, np.interp(time_s, own, values))
 
 
 def _slow(name: str, channel: Channel, time_s: Array, held: bool) -> list[Finding]:
