@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -198,9 +197,7 @@ def _culprit(ratio: float, slope: float) -> str:
 
 def _check_torques(signals: Mapping[str, Array]) -> Iterator[Finding]:
     """Torques of one axle that differ by a lasting factor or sign."""
-    for left, right in combinations(WHEELS, 2):
-        if left[0] != right[0]:
-            continue
+    for left, right in (WHEELS[:2], WHEELS[2:]):
         names = f"wheel_torque_{left}_nm", f"wheel_torque_{right}_nm"
         if any(name not in signals for name in names):
             continue
@@ -229,19 +226,22 @@ def _check_turning(signals: Mapping[str, Array]) -> Iterator[Finding]:
                 f"{span(TRACKS_M)} m. Is the yaw rate's unit or sign wrong?",
                 fatal=False,
             )
-    for name, with_yaw, unit in (
-        ("accel_y_m_s2", (1.0 / FACTOR, FACTOR), "times the vehicle's speed times yaw_rate_rad_s"),
-        ("steering_angle_rad", WHEELBASES_M, "m of wheelbase by speed and yaw_rate_rad_s"),
+    for name, of, values, (low, high), unit in (
+        (
+            "accel_y_m_s2",
+            speed * yaw,
+            1.0,
+            (1.0 / FACTOR, FACTOR),
+            "times the vehicle's speed times yaw_rate_rad_s",
+        ),
+        ("steering_angle_rad", yaw, speed, WHEELBASES_M, "m of wheelbase by speed and yaw_rate_rad_s"),
     ):
         if name not in signals:
             continue
-        of = (speed * yaw if name == "accel_y_m_s2" else yaw)[turning]
-        values = (signals[name] if name == "accel_y_m_s2" else signals[name] * speed)[turning]
-        slope = _slope(of, values)
-        if slope is not None and not with_yaw[0] <= slope <= with_yaw[1]:
+        slope = _slope(of[turning], (signals[name] * values)[turning])
+        if slope is not None and not low <= slope <= high:
             yield Finding(
-                f"{name} is {slope:.3g} {unit}; expected {with_yaw[0]:.2g} to {with_yaw[1]:.2g}. Is its unit or sign "
-                "wrong?",
+                f"{name} is {slope:.3g} {unit}; expected {low:.2g} to {high:.2g}. Is its unit or sign wrong?",
                 fatal=False,
             )
 

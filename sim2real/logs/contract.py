@@ -54,5 +54,11 @@ _ALL = (
 COLUMNS: dict[str, Column] = {column.name: column for column in _ALL}
 """All columns of a log by name."""
 
+
+def is_optional(name: str) -> bool:
+    """Whether a name is a column of the log format that a log can do without."""
+    return name in COLUMNS and not COLUMNS[name].required
+
+
 REQUIRED = tuple(column.name for column in _ALL if column.required)
 WHEEL_SPEEDS = tuple(f"wheel_speed_{w}_rad_s" for w in WHEELS)

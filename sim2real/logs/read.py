@@ -19,11 +19,11 @@ from sim2real.logs.formats.mat_file import read_mat
 from sim2real.logs.formats.mdf_file import needs_dbc, read_mdf
 from sim2real.logs.formats.parquet_file import read_parquet
 from sim2real.logs.log import Log
-from sim2real.logs.mapping import NO_MAPPING, Mapping
+from sim2real.logs.mapping import NO_MAPPING, Format, Mapping
 from sim2real.logs.plausible import lost_samples, without_codes, without_stuck_codes
 from sim2real.logs.resampling import median_step
 from sim2real.logs.rows import in_order, one_per_message
-from sim2real.logs.table import Array, Finding, Table
+from sim2real.logs.table import Array, Finding, Table, Wanted
 from sim2real.logs.translate import (
     ignored_columns,
     missing_columns,
@@ -101,7 +101,8 @@ def understood(
     path, mapping = Path(path), mapping or NO_MAPPING
     files = [dbc] if isinstance(dbc, str | Path) else list(dbc or ())
     try:
-        row_word, table = _read_table(path, mapping, files, progress)
+        wanted = wanted_columns(mapping)
+        row_word, table = _read_table(path, wanted, mapping.format, files, progress)
     except LogError:
         raise
     except (FileError, ValueError) as error:  # the latter of text that is no picture's path
@@ -225,10 +226,9 @@ def _understand(table: Table, mapping: Mapping, path: Path, row_word: str) -> Un
 
 
 def _read_table(
-    path: Path, mapping: Mapping, dbc: Sequence[str | Path], progress: Callable[[int], None]
+    path: Path, wanted: Wanted, stated: Format, dbc: Sequence[str | Path], progress: Callable[[int], None]
 ) -> tuple[str, Table]:
     """The file's columns, and what one of its rows is called; the content tells the format, the name must agree."""
-    wanted = wanted_columns(mapping)
     with open_file(path, MOST_BYTES, "a log") as file:
         start = file.read(START_BYTES)
     kind = MAGIC.get(start[:4]) or kind_of(start) or "CSV"
@@ -244,7 +244,7 @@ def _read_table(
         from sim2real.logs.formats.bus_file import read_bus  # cantools is an extra
 
         return "sample", read_bus(path, kind, wanted, dbc)
-    row_word, table = _read_named(path, kind, mapping, progress)
+    row_word, table = _read_named(path, kind, wanted, stated, progress)
     if dbc:
         told = Finding(f"is a {kind} file, whose columns have names: the DBC file is not used.", fatal=False)
         table = replace(table, findings=(*table.findings, told))
@@ -252,14 +252,13 @@ def _read_table(
 
 
 def _read_named(
-    path: Path, kind: str, mapping: Mapping, progress: Callable[[int], None]
+    path: Path, kind: str, wanted: Wanted, stated: Format, progress: Callable[[int], None]
 ) -> tuple[str, Table]:
     """The columns of a file that names them."""
-    wanted = wanted_columns(mapping)
     if kind == "Parquet":
         return "row", read_parquet(path, wanted)
     if kind == "MDF":
         return "sample", read_mdf(path, wanted)
     if kind == "MAT":
         return "sample", read_mat(path, wanted)
-    return "row", read_csv(path, wanted, mapping.format, progress)
+    return "row", read_csv(path, wanted, stated, progress)

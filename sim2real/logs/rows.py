@@ -13,10 +13,8 @@ from numpy.typing import NDArray
 from sim2real.logs.checks import Row, rows_text
 from sim2real.logs.contract import TIME
 from sim2real.logs.rasters import Channel, table_of
-from sim2real.logs.table import Array, Finding, Table, Wanted
+from sim2real.logs.table import MOST_OUT_OF_ORDER, Array, Finding, Table, Wanted
 
-MOST_OUT_OF_ORDER = 0.01
-"""Share of rows without a time of their own up to which they are left out [-]."""
 MESSAGES = 20
 """Samples from which on a column counts as a message of its own."""
 LONGEST_PAUSE = 4.0

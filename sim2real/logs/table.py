@@ -28,6 +28,9 @@ MISSING = frozenset({"", "nan", "+nan", "-nan", "na", "n/a", "null"})
 """Cells that say that a sample was lost, in lower case."""
 _BRACKETED = re.compile(r"(?P<name>.*\S)\s*(?P<mark>[\[(])(?P<unit>[^\[\]()]*)[\])]\s*")
 
+MOST_OUT_OF_ORDER = 0.01
+"""Share of rows or frames without a time of their own up to which a log is mended [-]."""
+
 SHOWN = 3
 """Cells or rows of one kind that an error lists; the rest is counted."""
 

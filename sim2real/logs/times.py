@@ -31,7 +31,7 @@ _LIKE_TIME = re.compile(
 
 @dataclass(frozen=True)
 class Times:
-    """Times of a column [s], shape (n,), NaN where a cell is no time; how it was read, empty where it was numbers."""
+    """Times of a column [s], shape (n,), NaN where a cell is no time; how they were read, empty for plain numbers."""
 
     time_s: Array
     note: str = ""
@@ -51,18 +51,18 @@ def times_of_texts(cells: Sequence[str], form: str = "") -> Times:
     first = next((cell for cell in cells if cell), "")
     if form in ("", CLOCK) and _is_clock(first):
         clock = pd.to_timedelta(texts.where(texts.map(_is_clock)), errors="coerce")
-        return Times(_over_midnight(_seconds(clock.to_numpy())), "a clock HH:MM:SS")
+        return Times(_over_midnight(_seconds(clock.to_numpy())), "time as a clock HH:MM:SS")
     pattern = form if "%" in form else "ISO8601"
     stamps = pd.to_datetime(texts, format=pattern, errors="coerce", utc=True).dt.tz_localize(None)
     name = pattern if "%" in form else "ISO 8601"
-    return Times(_since_first(stamps.to_numpy()), f"{name}, from the first row on")
+    return Times(_since_first(stamps.to_numpy()), f"time as {name}, from the first row on")
 
 
 def times_of_stamps(stamps: NDArray[np.generic]) -> Times:
     """Seconds of datetime64 since the first of them, or of timedelta64 as they are."""
     if stamps.dtype.kind == "M":
-        return Times(_since_first(stamps), "timestamps, from the first row on")
-    return Times(_seconds(stamps), "durations")
+        return Times(_since_first(stamps), "time as timestamps, from the first row on")
+    return Times(_seconds(stamps), "time as durations")
 
 
 def times_of_numbers(values: Array, form: str = "") -> Times:
@@ -73,16 +73,16 @@ def times_of_numbers(values: Array, form: str = "") -> Times:
     """
     known = values[np.isfinite(values)]
     if form in EPOCHS:
-        return Times(_from_first(values) * EPOCHS[form], f"{form}, from the first row on")
+        return Times(_from_first(values) * EPOCHS[form], f"time as {form}, from the first row on")
     if form == CLOCK:
-        return Times(_over_midnight(_of_clock(values)), "a clock HHMMSS")
+        return Times(_over_midnight(_of_clock(values)), "time as a clock HHMMSS")
     if form or len(known) < 2:
         return Times(values)
     for name, unit_s in list(EPOCHS.items())[1:]:
         if EPOCH_S[0] <= known.min() * unit_s and known.max() * unit_s <= EPOCH_S[1]:
-            return Times(_from_first(values) * unit_s, f"{name}, from the first row on")
+            return Times(_from_first(values) * unit_s, f"time as {name}, from the first row on")
     if _jumps_like_a_clock(known):
-        return Times(_over_midnight(_of_clock(values)), "a clock HHMMSS")
+        return Times(_over_midnight(_of_clock(values)), "time as a clock HHMMSS")
     return Times(values)
 
 
@@ -90,7 +90,7 @@ def whole_nanoseconds(values: NDArray[np.int64]) -> Times | None:
     """Seconds since the first of whole numbers of nanoseconds since 1970, which no float64 holds; None of others."""
     if len(values) == 0 or not EPOCH_S[0] * _NS <= values.min() <= values.max() <= EPOCH_S[1] * _NS:
         return None
-    return Times((values - values[0]) / _NS, "epoch_ns, from the first row on")
+    return Times((values - values[0]) / _NS, "time as epoch_ns, from the first row on")
 
 
 def _jumps_like_a_clock(values: Array) -> bool:

@@ -104,7 +104,7 @@ def read_time(table: Table, mapping: Mapping) -> tuple[Array | None, Table]:
         times = times_of_numbers(table.numbers[name], mapping.time_form)
         if times.note:
             numbers = table.numbers | {name: times.time_s}
-            table = table.with_numbers(numbers, (*table.notes, f"time as {times.note}"))
+            table = table.with_numbers(numbers, (*table.notes, times.note))
     time_s = _Evaluation(table, _specs(mapping), None, {}, findings).column(TIME)
     return time_s, table.with_numbers(table.numbers, table.notes, findings)
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from sim2real.logs.contract import COLUMNS, TIME
+from sim2real.logs.contract import TIME, is_optional
 from sim2real.logs.errors import LogError
 from sim2real.logs.formats.bus_signals import Catalogue, Described, Frames, decoded, merged, ordered
 from sim2real.logs.formats.extraction import Extract, extract
-from sim2real.logs.formats.mdf_file import extract_mdf
+from sim2real.logs.formats.mdf_file import extract_mdf, table_of_mdf
 from sim2real.logs.rasters import Channel, table_of
 from sim2real.logs.table import Finding, Table, Wanted
 
@@ -56,7 +56,7 @@ def read_bus(path: Path, kind: str, wanted: Wanted, dbc: Sequence[str | Path]) -
         found = extract_mdf(path, wanted, ids)
         if not found.told["bus"]:
             told = Finding("holds no raw frames of a bus: the DBC file is not used.", fatal=False)
-            table = table_of(path, found.told["names"], found.told["masters"], found.channels(), wanted)
+            table = table_of_mdf(path, found, wanted)
             return replace(table, findings=(*table.findings, told))
     else:
         found = extract(path, "bus_frames", kind, f"expected a whole {kind} log", form=kind, frames=ids)
@@ -79,7 +79,7 @@ def read_bus(path: Path, kind: str, wanted: Wanted, dbc: Sequence[str | Path]) -
                 f"{found.told['odd']} frames, rows or objects cannot be read and are left out.", fatal=False
             )
         )
-    absent = {name for name, (each, _) in meant.items() if name not in channels and not _optional(name)}
+    absent = {name for name, (each, _) in meant.items() if name not in channels and not is_optional(name)}
     used = {each.name for each, _ in meant.values()}
     others = [n for n in found.told.get("names", ()) if not n.startswith(PARTS)]
     names = [
@@ -150,7 +150,7 @@ def _absent(
     there: list[Frames],
 ) -> list[Finding]:
     """What is missing of a message; nothing where the log format can do without."""
-    needed = [name for name, _ in members if not _optional(name)]
+    needed = [name for name, _ in members if not is_optional(name)]
     if not needed:
         return []
     where = f" on channel {channel}" if channel else ""
@@ -160,11 +160,6 @@ def _absent(
             f"message {message} (ID {_hex(*kind)}) of {', '.join(needed)} does not occur in the log{where}{seen}."
         )
     ]
-
-
-def _optional(name: str) -> bool:
-    """Whether a name is the log format's own and not required."""
-    return name in COLUMNS and not COLUMNS[name].required
 
 
 def _no_name(catalogue: Catalogue) -> Finding:

@@ -105,10 +105,8 @@ def extract(order: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     with Complaints() as complaints, Path(order["path"]).open("rb") as file:
         if order["form"] == "BLF":
             blf = BLFReader(file)
-            epoch_s, blf.start_timestamp = (
-                blf.start_timestamp,
-                0.0,
-            )  # times from the begin have all their digits
+            epoch_s = blf.start_timestamp
+            blf.start_timestamp = 0.0  # times from the begin have all their digits
             found = Collected(order["frames"], order["most_numbers"], first_channel=1)
             size = os.fstat(file.fileno()).st_size
             found.take(blf)

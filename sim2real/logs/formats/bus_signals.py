@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 from sim2real.logs.errors import LogError
 from sim2real.logs.formats.dbc import DAMAGE, load_dbc, no_value
 from sim2real.logs.rasters import Channel
-from sim2real.logs.table import Array, Finding
+from sim2real.logs.table import MOST_OUT_OF_ORDER, Array, Finding
 from trpac_core.files import quoted
 
 FD_LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 """Lengths that a frame can have; a message of another one is sent in the next longer frame [bytes]."""
-MOST_MENDED = 0.01
-"""Share of a message's frames that may be late or repeat a time; more is no order to be mended [-]."""
 HALF_STEP = 0.5
 """A value may pass its stated range by so many steps of its raw value: ranges in DBC files are rounded."""
 
@@ -138,7 +136,7 @@ def ordered(name: str, frames: Frames) -> tuple[Frames, list[Finding]]:
         f"message {name}: of {len(time_s)} frames {len(late)} are late and {len(repeated)} repeat a time, the first at "
         f"{first_s:.3f} s"
     )
-    if len(late) + len(repeated) > MOST_MENDED * len(time_s):
+    if len(late) + len(repeated) > MOST_OUT_OF_ORDER * len(time_s):
         return frames, [Finding(f"{text}; expected ascending times.")]
     told = Finding(f"{text}; they were sorted, and the last of each time kept.", fatal=False)
     return frames.rows(rows[last]), [told]

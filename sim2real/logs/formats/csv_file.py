@@ -46,6 +46,8 @@ BLOCK_BYTES = 4 * LONGEST_LINE
 """What is read at once; a row may be as long [bytes]."""
 LARGEST_WHOLE = 2.0**53
 """Greatest number up to which a float64 holds every whole one."""
+MOST_BAD = 1000
+"""Cells of a column that are no numbers which are kept for messages, in each block."""
 Progress = Callable[[int], None]
 """Called with the bytes read so far."""
 
@@ -82,7 +84,7 @@ def read_csv(path: Path, wanted: Wanted, stated: Format, progress: Progress) -> 
             values, bad = _as_numbers(cells, dialect.decimal)
             if name == wanted.time and (exact := _nanoseconds(cells, values)) is not None:
                 values, units[name] = exact.time_s, "s"
-                notes.append(f"time as {exact.note}")
+                notes.append(exact.note)
             elif name == wanted.time and (bad or wanted.time_form):
                 if len(bad) > 0.5 * len(cells) or "%" in wanted.time_form:
                     times = times_of_texts(_told(cells), wanted.time_form)
@@ -90,9 +92,11 @@ def read_csv(path: Path, wanted: Wanted, stated: Format, progress: Progress) -> 
                     texts = [(int(k), str(cells[int(k)])) for k in lost]
                     values, bad = times.time_s, [one for one in texts if one[1].lower() not in MISSING]
                     units[name] = "s"
-                    notes.append(f"time as {times.note}")
-            elif bad and name in wanted.identifiers and len(bad) == len(cells) - _lost(cells):
-                values, bad = numbered(_told(cells)), []
+                    notes.append(times.note)
+            elif bad and name in wanted.identifiers:
+                told = _told(cells)
+                if len(bad) == sum(map(bool, told)):
+                    values, bad = numbered(told), []
         if bad:
             findings.append(_bad_cells(name, bad, rows, name == wanted.time))
         else:
@@ -219,10 +223,6 @@ def _read_blocks(
     return found
 
 
-MOST_BAD = 1000
-"""Cells of a column that are no numbers which are kept for messages, in each block."""
-
-
 def _as_numbers(cells: pa.Array, decimal: str) -> tuple[Array, list[tuple[int, str]]]:
     """Cells as numbers, NaN for lost ones, and the places of those that are neither, with their text."""
     plain = pc.if_else(pc.equal(cells, ""), None, cells)
@@ -260,10 +260,6 @@ def _joined(blocks: Sequence[tuple[Array, list[tuple[int, str]]]]) -> tuple[Arra
 
 def _told(cells: pa.ChunkedArray) -> list[str]:
     return ["" if cell.lower() in MISSING else cell for cell in cells.to_pylist()]
-
-
-def _lost(cells: pa.ChunkedArray) -> int:
-    return sum(not cell for cell in _told(cells))
 
 
 def _row_numbers(path: Path, dialect: Dialect, found: _Found) -> tuple[NDArray[np.int64], list[Finding]]:

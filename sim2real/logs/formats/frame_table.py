@@ -29,7 +29,7 @@ def frame_table(frame: pd.DataFrame, wanted: Wanted) -> Table:
         times = _times(column, name, wanted)
         if times is not None:
             numbers[name], units[name] = times.time_s, "s"
-            notes.append(f"time as {times.note}")
+            notes.append(times.note)
         elif name in wanted.text:
             text[name] = labels_of(_cells(column))
         elif pd.api.types.is_numeric_dtype(column) and not pd.api.types.is_bool_dtype(column):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sim2real.logs.contract import COLUMNS, TIME
+from sim2real.logs.contract import TIME, is_optional
 from sim2real.logs.formats.extraction import Extract, extract
 from sim2real.logs.rasters import Channel, table_of
 from sim2real.logs.table import Array, Finding, Table, Text, Wanted, labels_of, numbered
@@ -137,9 +137,7 @@ def _objects(found: Extract, wanted: Wanted) -> list[Finding]:
     missing = {
         name
         for name in wanted.numbers | wanted.text
-        if name not in found.told["channels"]
-        and not (name in COLUMNS and not COLUMNS[name].required)
-        and name != TIME
+        if name not in found.told["channels"] and not is_optional(name) and name != TIME
     }
     return [
         Finding(

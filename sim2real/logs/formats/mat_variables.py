@@ -157,8 +157,9 @@ def _answer(
             arrays[f"samples_{k}"] = np.array([text[:LONGEST_TEXT] for text in signal.values.read()], np.str_)
         elif not kind:
             arrays[f"samples_{k}"] = _vector(signal.values)
+    used = set(chosen.values())
     told = {
-        "names": [by for name in found for by in [name if name not in chosen.values() else ""] if by],
+        "names": [name for name in found if name and name not in used],
         "masters": sorted({name for pair in times for name in (pair, short.get(pair, pair))}),
         "opaque": dict(list(opaque.items())[:20]),
         "several": {
@@ -220,21 +221,16 @@ def _walk(
     for name, node in struct.items():
         if isinstance(node, Numbers | Texts):
             found[at(name)] = Found(node, _fitting(node, time), "")
-        elif isinstance(node, Opaque):
-            opaque[at(name)] = node.kind
-        elif isinstance(node, dict):
-            inner = path if own and name.casefold() == "signals" else at(name)
-            label = _label(node) if inner == path else ""
-            _walk(f"{path}.{label}".lstrip(".") if label else at(name), node, time, found, opaque)
-        elif isinstance(node, list):
-            for k, element in enumerate(node):
-                place = f"{at(name)}({k + 1})"
-                if isinstance(element, dict):
-                    label = _label(element)
-                    inside = path if own and name.casefold() == "signals" else at(name)
-                    _walk(f"{inside}.{label}".lstrip(".") if label else place, element, time, found, opaque)
-                elif isinstance(element, Opaque):
-                    opaque[place] = element.kind
+            continue
+        is_array, is_signals = isinstance(node, list), own is not None and name.casefold() == "signals"
+        inside = path if is_signals else at(name)
+        for k, element in enumerate(node if is_array else [node]):
+            place = f"{at(name)}({k + 1})" if is_array else at(name)
+            if isinstance(element, Opaque):
+                opaque[place] = element.kind
+            elif isinstance(element, dict):
+                label = _label(element) if is_array or is_signals else ""
+                _walk(f"{inside}.{label}".lstrip(".") if label else place, element, time, found, opaque)
 
 
 def _holds(struct: dict[str, Any], size: int) -> bool:

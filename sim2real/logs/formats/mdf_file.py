@@ -19,10 +19,14 @@ def read_mdf(path: Path, wanted: Wanted) -> Table:
     A name that several groups have is told apart as NAME#GROUP.
     """
     found = extract_mdf(path, wanted)
-    channels = found.channels()
-    if found.told["bus"] and not any(name in channels for name in wanted.base):
+    if found.told["bus"] and not any(name in found.told["channels"] for name in wanted.base):
         raise needs_dbc(path, "MDF")
-    table = table_of(path, found.told["names"], found.told["masters"], channels, wanted)
+    return table_of_mdf(path, found, wanted)
+
+
+def table_of_mdf(path: Path, found: Extract, wanted: Wanted) -> Table:
+    """The wanted channels as a table, with the units of all channels."""
+    table = table_of(path, found.told["names"], found.told["masters"], found.channels(), wanted)
     units = {name: unit for name, unit in found.told["units"].items() if unit}
     return replace(table, units=units | table.units)
 

@@ -71,7 +71,7 @@ def read_parquet(path: Path, wanted: Wanted) -> Table:
             numbers[name] = np.full(table.num_rows, np.nan)
         elif (times := _times(column, name, wanted)) is not None:
             numbers[name], units[name] = times.time_s, "s"
-            notes.append(f"time as {times.note}")
+            notes.append(times.note)
         elif _is_number(column.type):
             numbers[name] = column.cast(pa.float64(), safe=False).to_numpy().astype(np.float64)
         else:
