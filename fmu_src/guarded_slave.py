@@ -2,7 +2,7 @@
 
 The wrapper of pythonfmu frees the slave when an exception leaves a callback, while the host keeps its handle:
 the next call would use freed memory. It also passes log texts on as printf formats. This module handles both for all
-slaves; see docs/fmu.md.
+slaves; see docs/reference/unit.md.
 """
 
 from __future__ import annotations

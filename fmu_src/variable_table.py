@@ -10,7 +10,7 @@ from trpac_core.parameters.variables import Variable
 
 from .units import UNITS
 
-DOCS = Path(__file__).parent.parent / "docs"
+DOCS = Path(__file__).parent.parent / "docs" / "reference"
 TARGETS = {
     "TrpacEstimator": DOCS / "fmu_variables.md",
     "TrpacEstimator4W": DOCS / "fmu_variables_4w.md",

@@ -31,7 +31,7 @@ CONFIDENCE_MEMORY_S = 0.15
 """Correlation time of the confidence: successive pictures show nearly the same road [s]."""
 WRONG_SHARE = 0.02
 """Share of undisturbed pictures with a wrong class: the paper's 1.5 of 100, rounded up; our
-networks are wrong in 12 on rendered roads (docs/camera_scores.md), in runs, as in
+networks are wrong in 12 on rendered roads (lab/2026-11-29_camera_scores.md), in runs, as in
 benchmarks/accuracy/random_drives.py [-]."""
 BORDER_BLEND_M = 0.1
 """Standard deviation of the position of a border between classes, which is not sharp [m]."""

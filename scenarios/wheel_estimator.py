@@ -85,7 +85,7 @@ class Estimator:
     camera : path or name, optional
         The camera of the pictures for `step`.
     method : str
-        as_printed, dife or robust (docs/methods.md).
+        as_printed, dife or robust (docs/theory/methods.md).
 
     Raises
     ------

@@ -27,7 +27,7 @@ def require_alone(model: object, signals: object, pairing: Pairing | None) -> No
     if (model is None) != (signals is None):
         raise ScenarioError(
             "model and signals belong together; expected a unit (.fmu) and the file that says which of its variables "
-            "is which signal (.yaml), see docs/gap_own_model.md."
+            "is which signal (.yaml), see docs/guide/gap_own_model.md."
         )
     if model is not None and pairing is not None:
         raise ScenarioError(

@@ -97,7 +97,7 @@ def estimate(
     Parameters
     ----------
     log : DataFrame or path
-        Columns of the log format (docs/logs.md), or those that the mapping names.
+        Columns of the log format (docs/guide/logs.md), or those that the mapping names.
     vehicle : Vehicle, path or name, optional
         The car; by default that of the paper (Table 3), with a warning.
     mapping, camera : path, optional
@@ -107,7 +107,7 @@ def estimate(
     peers : bool
         Whether to run estimators of the literature as well.
     method : str
-        Estimator: as_printed, dife or robust (docs/methods.md).
+        Estimator: as_printed, dife or robust (docs/theory/methods.md).
     progress : callable
         Called with the stage, and how many of how many of its items are done.
 

@@ -157,9 +157,9 @@ def run(
     fmu : path, optional
         The unit; by default one is built.
     kind : str
-        Kind of the unit that is built: python or native (docs/native.md).
+        Kind of the unit that is built: python or native (docs/guide/unit/native.md).
     method : str
-        Estimator of the unit: as_printed, dife or robust (docs/methods.md).
+        Estimator of the unit: as_printed, dife or robust (docs/theory/methods.md).
     progress : callable
         Called with the stage, and how many of how many of its items are done.
 

@@ -60,8 +60,8 @@ def estimate(
     A raw log of the bus (BLF, ASC, candump, TRC, MDF) needs --dbc car.dbc;
     its columns are named Message.Signal.
 
-    Ready-made mapping files lie in sim2real/mappings, formats in docs/logs.md,
-    how to read the result in docs/estimate.md.
+    Ready-made mapping files lie in sim2real/mappings, formats in docs/guide/logs.md,
+    how to read the result in docs/guide/estimate.md.
 
     Exit codes: 0 with an estimate, 2 unusable input, and then nothing is written.
     """

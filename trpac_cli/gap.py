@@ -123,7 +123,7 @@ def diagnose(
     A mapping file names columns and units that are not the log format's:
     schema: 1, and under columns: lines such as
     vehicle_speed_m_s: {column: VehSpd, unit: km/h}. Ready-made ones lie in
-    sim2real/mappings, all that they can say is in docs/logs.md.
+    sim2real/mappings, all that they can say is in docs/guide/logs.md.
 
     A car that is built otherwise than the simulated one leaves a gap without
     any fault. --baseline before.csv, any drive before the fault, tells how
@@ -135,7 +135,7 @@ def diagnose(
     count from the same point; where it does not, --by position.
 
     Your own plant as an FMU does the same, is tuned, and needs a file of
-    signals, such as this one; docs/gap_own_model.md has all of it:
+    signals, such as this one; docs/guide/gap_own_model.md has all of it:
     schema: 1; inputs: {motor.fl: {signal: wheel_torque_fl_nm}, ...};
     outputs: {vehicle_speed_m_s: {column: v, unit: km/h}, ...};
     initial: {v0: {signal: vehicle_speed_m_s}};

@@ -135,7 +135,7 @@ def hil(
     """Step the unit in real time against a CAN bus; end with Ctrl-C.
 
     Wheel speeds, torques, vehicle speed and the road's class come in, TRPAC,
-    flag and K_v go out, as trpac_hil/trpac.dbc says (docs/hil_dbc.md).
+    flag and K_v go out, as trpac_hil/trpac.dbc says (docs/reference/bus_messages.md).
 
     Example without hardware: trpac hil --with-plant --duration-s 30 --out out/hil
 

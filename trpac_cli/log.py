@@ -61,7 +61,7 @@ def check(
     then, with map.yaml corrected:
     trpac log check drive.csv --map map.yaml --out drive.parquet
 
-    Names, units and mapping files: docs/logs.md.
+    Names, units and mapping files: docs/guide/logs.md.
 
     Exit codes: 0 fit for use, 1 readable but not enough, 2 not readable, and then nothing is written.
     """

@@ -10,7 +10,7 @@ from cantools.database.can import Message, Signal
 from trpac_hil.codec import load_codec
 from trpac_hil.message import NOT_AVAILABLE, STALE_AFTER
 
-TARGET = Path(__file__).parent.parent / "docs" / "hil_dbc.md"
+TARGET = Path(__file__).parent.parent / "docs" / "reference" / "bus_messages.md"
 _HEAD = """# Messages of `trpac hil`
 
 Written by `python -m trpac_hil.dbc_table` from `trpac_hil/trpac.dbc`; do not edit. How they are used: [hil.md](hil.md).

@@ -276,7 +276,7 @@ class Coded:
             if len(data) != padded(least):
                 raise ValueError(
                     f"{self.message.name}: {len(data)} bytes; expected {least}, or these filled up to a length of CAN "
-                    "FD, see docs/hil_dbc.md."
+                    "FD, see docs/reference/bus_messages.md."
                 )
             data = data[:least]
         little, big, fields = int.from_bytes(data, "little"), int.from_bytes(data, "big"), self.fields

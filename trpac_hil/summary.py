@@ -35,7 +35,7 @@ def summarise(
     system: Mapping[str, Any],
     ended: str,
 ) -> dict[str, Any]:
-    """The content of summary.json; docs/hil.md has its fields."""
+    """The content of summary.json; docs/guide/bus.md has its fields."""
     done = messages.get("done")
     return {
         "unit": unit.name,

@@ -159,7 +159,7 @@ class Unit:
         unknown = sorted(set(settings) - usable - set(WHICH_WHEEL))
         if unknown:
             raise HilError(
-                f"{self.archive}: has no parameter {', '.join(unknown)}; see docs/fmu_variables.md."
+                f"{self.archive}: has no parameter {', '.join(unknown)}; see docs/reference/fmu_variables.md."
             )
         known = {name: value for name, value in settings.items() if name in usable}
         typed = {name: kinds[types[name]](value) for name, value in known.items()}

@@ -1,6 +1,6 @@
 """How far off are the estimator, DE and the peers on logs that others made, where the true peak friction is known?
 
-    python -m benchmarks.accuracy.estimate_logs DIR [--write docs/estimate.md]
+    python -m benchmarks.accuracy.estimate_logs DIR [--write docs/guide/estimate.md]
 
 DIR is the folder that holds vehicle_logs/. With --write the tables between the markers of that document are replaced.
 All wheels count row by row. One clock for all: the rows in which DE's excitation flag is up at the wheel.

@@ -1,4 +1,4 @@
-"""All figures of docs/fusion.md, of the shipped sweeps that `trpac sweep` has run into folders of one.
+"""All figures of lab/2026-11-29_fusion_over_many_drives.md, of the shipped sweeps that `trpac sweep` has run into folders of one.
 
 ``python -m benchmarks.accuracy.fusion_tables out/fusion`` writes their tables between the markers of the page, and the
 pictures beside it. It takes sweeps that are not finished too, and says how many runs each table rests on.
@@ -26,7 +26,7 @@ from scenarios.sweep.summary import distribution, shown_enough, slippery, summar
 
 ROOT = Path(__file__).resolve().parents[2]
 SWEEPS = ROOT / "scenarios" / "sweeps"
-PAGE, PICTURES = ROOT / "docs" / "fusion.md", ROOT / "docs" / "fusion"
+PAGE, PICTURES = ROOT / "lab" / "2026-11-29_fusion_over_many_drives.md", ROOT / "lab" / "fusion"
 NAMES = ("methods", "paper_simulation", "peers", "road_test", "road_test_brakes", "degradation")
 DASH = "–"
 LEAST_RUNS = 5

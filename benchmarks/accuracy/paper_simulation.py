@@ -1,7 +1,7 @@
 """Accuracy of IFE, DE and DIFE on the paper's simulation, over seeds, tyre stiffness, gains and noise.
 
 Each case is the whole chain: plant, freshly rendered and disturbed pictures of another world, the built unit under
-fmpy. Nothing is tuned on any of these cases but for what docs/dynamics.md says. Prints a table, writes JSON.
+fmpy. Nothing is tuned on any of these cases but for what docs/theory/dynamics.md says. Prints a table, writes JSON.
 
 .venv/bin/python -m benchmarks.accuracy.paper_simulation [--out FILE.json]
 """

@@ -154,7 +154,7 @@ def _tell(folder: Path, factor: float, told: Any) -> None:
     told.put((factor, _alone(folder, factor)))
     told.close()
     told.join_thread()
-    os._exit(0)  # see "Limits" in docs/fmu.md
+    os._exit(0)  # see "Limits" in docs/reference/unit.md
 
 
 def _factors() -> list[float]:
@@ -319,7 +319,7 @@ def main() -> None:
     if options.part:
         part, folder, count = options.part
         print(json.dumps(PARTS[part](Path(folder), int(count))), flush=True)
-        os._exit(0)  # see "Limits" in docs/fmu.md
+        os._exit(0)  # see "Limits" in docs/reference/unit.md
     figures = {
         "versions": {p: version(p) for p in ("fmpy", "pythonfmu", "numpy", "onnxruntime")},
         "units": {u: measure(u, options.steps, options.instances) for u in options.unit or CASES},

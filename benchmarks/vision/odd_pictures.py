@@ -2,7 +2,7 @@
 
 ``python -m benchmarks.vision.odd_pictures [--models DIR] [--page]`` shows them to
 the image estimator and prints how many end in flag 0, kind by kind: all ought to. --page writes the table into
-docs/camera_scores.md.
+lab/2026-11-29_camera_scores.md.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from trpac_core.vision.results import FrameResult
 from trpac_core.vision.trajectory import Motion
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "camera_scores.md"
+PAGE = ROOT / "lab" / "2026-11-29_camera_scores.md"
 WIDTH_PX, HEIGHT_PX = 960, 600
 SCALE = 0.5
 DISPLAY_GAMMA = 2.2
@@ -177,7 +177,7 @@ def table(ife: Ife, count: int = 16) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--models", type=Path, default=ROOT / "models")
-    parser.add_argument("--page", action="store_true", help="write the table into docs/camera_scores.md")
+    parser.add_argument("--page", action="store_true", help="write the table into lab/2026-11-29_camera_scores.md")
     options = parser.parse_args()
     files = options.models / "segmenter.onnx", options.models / "surface.onnx"
     ife = Ife(IfeConfig(groups_looked_at=1), Segmenter(files[0]), SurfaceClassifier(files[1]))

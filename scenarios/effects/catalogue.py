@@ -1,6 +1,6 @@
 """Writes the page of all effects from their classes.
 
-python -m scenarios.effects.catalogue      # writes docs/effects.md
+python -m scenarios.effects.catalogue      # writes docs/reference/effects.md
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from scenarios.effects import EFFECTS, FORMS
 from scenarios.effects.base import Effect, Parameter, Value
 from trpac_core.vehicle import Vehicle
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "effects.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "effects.md"
 
 CAR = Vehicle()
 """The car for values that depend on the vehicle."""

@@ -127,7 +127,7 @@ def run_unit(
     except FMICallException as error:
         raise ScenarioError(
             f"{fmu}: refuses the scenario's settings or a step ({error}); its own words are above. Their ranges "
-            "stand in docs/fmu_variables.md."
+            "stand in docs/reference/fmu_variables.md."
         ) from error
     return table
 

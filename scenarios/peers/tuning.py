@@ -15,7 +15,7 @@ from scenarios.strict import load_strict
 from scenarios.yaml_text import to_yaml
 
 TUNING_FILE = Path(__file__).with_name("tuning.yaml")
-HEADER = "# Written by `python -m benchmarks.accuracy.tune_peers`; see docs/peers.md.\n"
+HEADER = "# Written by `python -m benchmarks.accuracy.tune_peers`; see docs/theory/peers.md.\n"
 
 
 @dataclass(frozen=True)

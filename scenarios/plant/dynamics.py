@@ -1,6 +1,6 @@
 """The plant's compiled step: four wheels on modified Dugoff tyres, straight on.
 
-Equations (docs/plant.md has them with their sources):
+Equations (docs/theory/plant.md has them with their sources):
 
     I omega' = T - F_x R - c F_z R - T_drag                     Eq. (12) in [1]_, with resistances
     m v'     = sum F_x - k v^2 - c_hub sum F_z - m g sin
@@ -55,7 +55,7 @@ FLOOR_SPEED_M_S = 0.01
 """Least denominator of slip, which is so 0 at standstill [m/s]."""
 
 TOLERANCE_M_S = 2e-5
-"""Accepted error estimate of a sub-step at rest, in wheel rim speed and vehicle speed; docs/plant.md [m/s]."""
+"""Accepted error estimate of a sub-step at rest, in wheel rim speed and vehicle speed; docs/theory/plant.md [m/s]."""
 
 RELATIVE_TOLERANCE = 5e-5
 """Growth of the accepted error estimate per vehicle speed, for equal accuracy of slip at all speeds [-]."""
@@ -84,7 +84,7 @@ LEAST_STIFFNESS = 0.1
 """Least share of the tyre stiffness where load leaves the tyre; a negative stiffness would push [-]."""
 
 INITIAL_SLOPE = 1.27
-"""Slope of the modified Dugoff force by slip at slip 0, over C_x; the constant of its G, docs/plant.md [-]."""
+"""Slope of the modified Dugoff force by slip at slip 0, over C_x; the constant of its G, docs/theory/plant.md [-]."""
 
 KNEE_AT, CREST_AT, SLIDING_FROM = 0.6, 2.4, 5.0
 """Values x = C_x lambda / (theta F_z) at which `reshaped` has its two bumps and half of its sliding part [-]."""
@@ -122,7 +122,7 @@ def falling_shape(theta: float, slip: float) -> tuple[float, float]:
 
 @inlined
 def tyre_force(theta: float, slip: float, load_n: float, stiffness_n: float) -> tuple[float, float, float]:
-    """Modified Dugoff force without side slip [2]_, coefficients as in docs/plant.md, and its slopes.
+    """Modified Dugoff force without side slip [2]_, coefficients as in docs/theory/plant.md, and its slopes.
 
     Parameters
     ----------

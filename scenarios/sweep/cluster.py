@@ -76,7 +76,7 @@ def security_of(scheduler: str) -> Security:
     if not here:
         raise ScenarioError(
             f"{name}: whoever reaches a scheduler without TLS can run code as its user; expected tls://HOST:PORT with "
-            "certificates in Dask's configuration (distributed.comm.tls; see docs/sweep.md)."
+            "certificates in Dask's configuration (distributed.comm.tls; see docs/guide/sweep.md)."
         )
     return Security()
 

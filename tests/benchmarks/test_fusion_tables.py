@@ -1,4 +1,4 @@
-"""The road test's scenarios, a run in full, and the generator of docs/fusion.md."""
+"""The road test's scenarios, a run in full, and the generator of lab/2026-11-29_fusion_over_many_drives.md."""
 
 from pathlib import Path
 

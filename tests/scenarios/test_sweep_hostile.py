@@ -209,10 +209,10 @@ class Certificates:
 
 
 def make_certificates(folder: Path) -> Certificates:
-    """As docs/sweep.md says."""
+    """As docs/guide/sweep.md says."""
     folder.mkdir()
     made = Certificates(folder / "ca.pem", folder / "dask.pem", folder / "dask-key.pem")
-    recipe = (ROOT / "docs" / "sweep.md").read_text().split("```sh\n")[1].split("```")[0]
+    recipe = (ROOT / "docs" / "guide" / "sweep.md").read_text().split("```sh\n")[1].split("```")[0]
     subprocess.run(["/bin/sh", "-e", "-c", recipe], cwd=folder, check=True, capture_output=True)
     return made
 

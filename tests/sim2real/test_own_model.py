@@ -99,7 +99,7 @@ def test_a_signals_file_is_read_strictly(tmp_path, parts, message):
 
 
 def test_the_file_in_the_docs_is_one(tmp_path):
-    page = (Path(__file__).parents[2] / "docs" / "gap_own_model.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "guide" / "gap_own_model.md").read_text(encoding="utf-8")
     path = tmp_path / "signals.yaml"
     path.write_text(page.partition("```yaml\n")[2].partition("```")[0], encoding="utf-8")
     assert set(load_signals(path).parameters) == {"car.m", "body.h"}

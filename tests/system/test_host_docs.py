@@ -15,7 +15,7 @@ import pytest
 from foreign_clients import need_client
 
 ROOT = Path(__file__).parents[2]
-PAGES = ROOT / "docs" / "hosts"
+PAGES = ROOT / "docs" / "guide" / "unit"
 DOCUMENTS = sorted(
     [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "models").glob("*.md")],
 )
@@ -24,7 +24,7 @@ FENCE = re.compile(r"^```([^\n`]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#+ +(.+?) *$", re.MULTILINE)
 ABORTED_AFTER_THE_RESULTS = 128 + 6
-"""The interpreter's shutdown with the wrapper loaded sometimes aborts: "Limits" in docs/fmu.md."""
+"""The interpreter's shutdown with the wrapper loaded sometimes aborts: "Limits" in docs/reference/unit.md."""
 
 
 class Block(NamedTuple):
@@ -122,11 +122,11 @@ def test_relative_links_lead_somewhere(document: Path) -> None:
 
 
 def test_index_names_every_page() -> None:
-    index = (PAGES / "README.md").read_text(encoding="utf-8")
+    index = (PAGES / "index.md").read_text(encoding="utf-8")
     missing = [
         page.name
         for page in PAGES.glob("*.md")
-        if page.name != "README.md" and f"]({page.name})" not in index
+        if page.name != "index.md" and f"]({page.name})" not in index
     ]
     assert not missing
 

@@ -16,7 +16,7 @@ from trpac_core.parameters.variables import Kind
 ROOT = Path(__file__).resolve().parents[2]
 TABLES = [
     [cell.strip() for cell in line.strip().strip("|").split("|")]
-    for line in (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8").splitlines()
+    for line in (ROOT / "docs" / "reference" / "nomenclature.md").read_text(encoding="utf-8").splitlines()
     if line.startswith("|") and not line.startswith(("|---", "| symbol", "| suffix"))
 ]
 ROWS = [row for row in TABLES if len(row) > 2]

@@ -197,7 +197,7 @@ def test_unit(files: Path, open_unit: Callable[..., Unit], odd: Odd):
 
 
 SOME_PASS = ("sky", "concrete_wall", "covered_lens")
-"""Kinds of which one in five or more passes for road: see docs/camera_scores.md."""
+"""Kinds of which one in five or more passes for road: see lab/2026-11-29_camera_scores.md."""
 
 
 def test_pictures_without_road_end_in_flag_0(ife):

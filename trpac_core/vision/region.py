@@ -178,7 +178,7 @@ class Region:
         """Share of the road looked at that is of use [-]: corners that are usable, times patches that can be read.
 
         The paper's is the first alone; the second takes covered lenses, walls and night skies below the flag's gate:
-        `docs/camera_scores.md` tells what it holds back.
+        `lab/2026-11-29_camera_scores.md` tells what it holds back.
         """
         read = len(self.probabilities) / self.drawn if self.drawn else 1.0
         return self.corners.p_util * read

@@ -1,4 +1,4 @@
 """Which client can do what with the units?
 
-``python -m benchmarks.robustness.conformance`` writes docs/conformance.md.
+``python -m benchmarks.robustness.conformance`` writes docs/reference/conformance.md.
 """

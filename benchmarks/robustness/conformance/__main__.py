@@ -1,4 +1,4 @@
-"""Run the matrix and write docs/conformance.md."""
+"""Run the matrix and write docs/reference/conformance.md."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def main() -> None:
             cell = outcome_of(runner, operation)
         line = {"ends": operation, "outcome": cell.outcome.name, "reason": cell.reason}
         print(json.dumps(line), file=answers, flush=True)
-    os._exit(0)  # see "Limits" in docs/fmu.md
+    os._exit(0)  # see "Limits" in docs/reference/unit.md
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ def main() -> None:
     for line in sys.stdin:
         status, value, log = client.ask(line.rstrip("\n"))
         print(*(f"log {said}" for said in log), f"= {status} {value}", sep="\n", flush=True)
-    os._exit(0)  # see "Limits" in docs/fmu.md
+    os._exit(0)  # see "Limits" in docs/reference/unit.md
 
 
 if __name__ == "__main__":

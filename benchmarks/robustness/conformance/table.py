@@ -13,7 +13,7 @@ from .operations import OPERATIONS
 from .outcome import Cell, Outcome
 
 NOT_RUN = "not run"
-DOCUMENT = Path(__file__).parents[3] / "docs" / "conformance.md"
+DOCUMENT = Path(__file__).parents[3] / "docs" / "reference" / "conformance.md"
 HEAD = """# Which client can do what with the units
 
 Written by `python -m benchmarks.robustness.conformance`; do not edit. It builds the units and lets each client do

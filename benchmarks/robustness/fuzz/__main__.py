@@ -28,7 +28,7 @@ def main() -> int:
     if options.child:
         name, seed, start, stop, folder = options.child
         child(name, int(seed), range(int(start), int(stop)), Path(folder))
-        os._exit(0)  # see "Limits" in docs/fmu.md
+        os._exit(0)  # see "Limits" in docs/reference/unit.md
     results = {}
     for name in options.kind or (*UNIT_NAMES, *KIND_NAMES):
         count = options.vectors if name in UNIT_NAMES else options.files

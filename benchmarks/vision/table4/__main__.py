@@ -6,7 +6,7 @@ DIR of --models holds `full/` and a folder per source left out of training (`wit
 `without_camvid`, `without_lums`), each with segmenter.onnx and surface.onnx. A row whose networks are not there is
 left out, and said so. A folder that holds
 segmenter.onnx itself, such as `models`, counts as `full`. Verdicts are kept in --out and used again for the same
-networks, pictures and code, so that a run broken off goes on. --page writes docs/camera_scores.md.
+networks, pictures and code, so that a run broken off goes on. --page writes lab/2026-11-29_camera_scores.md.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def _options(arguments: Row[str] | None) -> argparse.Namespace:
         "--drives", type=int, default=60, help="rendered drives of 60 frames; 0: real pictures only"
     )
     parser.add_argument("--no-time", action="store_true", help="do not measure the frame time")
-    parser.add_argument("--page", action="store_true", help="write docs/camera_scores.md")
+    parser.add_argument("--page", action="store_true", help="write lab/2026-11-29_camera_scores.md")
     return parser.parse_args(arguments)
 
 

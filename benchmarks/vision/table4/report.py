@@ -17,7 +17,7 @@ from .judge import SCENARIOS, VARIANTS, VOTING
 from .scores import Share, blocks_of, confusion, gate, method_of, n_w, recalls
 
 ROOT = Path(__file__).resolve().parents[3]
-PAGE, FIGURE = ROOT / "docs" / "camera_scores.md", ROOT / "docs" / "camera_scores.png"
+PAGE, FIGURE = ROOT / "lab" / "2026-11-29_camera_scores.md", ROOT / "lab" / "camera_scores.png"
 PAPER = {("normal", VOTING): 21.6621, ("normal", "IFE"): 1.5327, ("w/ interference", VOTING): 31.4714,
          ("w/ interference", "IFE"): 12.8406}  # fmt: skip
 CLIPS, SETS, STILLS, PARTS, RENDERED = (

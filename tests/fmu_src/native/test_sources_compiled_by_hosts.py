@@ -32,9 +32,9 @@ def by_fmpy(folder: Path) -> None:
 
 
 def by_the_documented_command(folder: Path) -> None:
-    """By the command of docs/native.md."""
+    """By the command of docs/guide/unit/native.md."""
     (command,) = re.findall(
-        r"^cc .*", (ROOT / "docs" / "native.md").read_text(encoding="utf-8"), re.MULTILINE
+        r"^cc .*", (ROOT / "docs" / "guide" / "unit" / "native.md").read_text(encoding="utf-8"), re.MULTILINE
     )
     subprocess.run(
         f"{command} && mv TrpacEstimator.so {shlex.quote(str(LIBRARY))}", shell=True, check=True, cwd=folder
