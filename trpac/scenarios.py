@@ -107,6 +107,13 @@ class ScenarioRun:
         rows = [{"estimator": name, **score} for name, score in score_rows(self.summary)]
         return pd.DataFrame(rows).to_html(index=False)
 
+    @property
+    def verdict(self) -> str:
+        """Results of the run in sentences, one per stretch of road."""
+        from scenarios.report import verdict
+
+        return verdict(self.summary)
+
     def figure17(self) -> Picture:
         """The paper's Figure 17 of this run."""
         from scenarios.figure17 import draw_figure17
@@ -129,8 +136,8 @@ class ScenarioRun:
                 draw_overlay_sheet(
                     self._run, overlay, lambda done, total: progress("drawing the report", done, total)
                 )
-            figure = self.figure17().save(made / "figure17.png")
-            write_report(self._run, figure, overlay, made / "report.html")
+            self.figure17().save(made / "figure17.png")
+            write_report(self._run, overlay, made / "report.html")
             write_run(self._run, made)
             names = sorted(path.name for path in made.iterdir())
         return tuple(Path(folder) / name for name in names)
