@@ -203,7 +203,8 @@ def _traces(series: Series) -> list[dict[str, Any]]:
         size = 4 if series.kind == "points" and len(y) > 50 else 8
         common["marker"] = {"color": style.colour.name, "symbol": style.marker, "size": size}
     if series.low is None:
-        at = thin(y) if series.kind != "points" else np.arange(len(y))
+        order = np.argsort(x, kind="stable") if series.kind == "points" else np.arange(len(y))
+        at = order[thin(y[order], MOST_POINTS // 2 if series.kind == "points" else MOST_POINTS)]
         return [common | _points(x[at], y[at])]
     low = np.asarray(series.low, dtype=float)
     known = np.isfinite(y) & np.isfinite(low)

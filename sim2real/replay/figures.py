@@ -28,8 +28,6 @@ TOP_THETA = 1.25
 """Upper end of the axes of theta [-]."""
 TOP_USED = 1.5
 """Upper end of the axes of used friction [-]."""
-MOST_SHOWN = 1500
-"""Points of a wheel in the plot of used friction over slip."""
 UNUSABLE = "no row of the log has usable readings of a wheel."
 
 
@@ -103,9 +101,8 @@ def curve(done: Replay) -> Figure:
     slip, used = np.where(rows, done.slip, np.nan), np.where(rows, done.used_friction, np.nan)
     most_slip, most_used = _largest(slip), min(_largest(used), TOP_USED)
     points = [
-        Series(wheel, slip[at, i], used[at, i], Style(style.colour, marker=style.marker), "points")
+        Series(wheel, slip[rows[:, i], i], used[rows[:, i], i], style, "points")
         for i, (wheel, style) in enumerate(WHEEL_STYLES.items())
-        for at in [_spread(np.flatnonzero(rows[:, i]))]
     ]
     if rows.any():
         # The load is the wheels' mean: the line is to be compared with the points, not to go through them.
@@ -159,11 +156,6 @@ def _over_time(
 ) -> Panel:
     ends = float(done.inputs.time_s[0]), float(done.inputs.time_s[-1])
     return Panel(label, empty, series, x_limits=ends, y_limits=y_limits, ticks=ticks, height=height)
-
-
-def _spread(rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """At most `MOST_SHOWN` of these, evenly."""
-    return rows if len(rows) <= MOST_SHOWN else rows[np.linspace(0, len(rows) - 1, MOST_SHOWN).astype(int)]
 
 
 def _largest(values: Array) -> float:
