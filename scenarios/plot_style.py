@@ -30,7 +30,9 @@ SHADE = Colour("--shade", "rgba(90, 96, 104, 0.14)", "rgba(169, 175, 184, 0.18)"
 """Fill behind a stretch of an axis."""
 WET = Colour("--wet", "rgba(0, 114, 178, 0.16)", "rgba(86, 180, 233, 0.22)")
 SNOW = Colour("--snow", "rgba(86, 180, 233, 0.07)", "rgba(230, 240, 255, 0.09)")
-COLOURS = (INK, QUIET, LINE, BLUE, VERMILLION, GREEN, PURPLE, BAND, SHADE, WET, SNOW)
+LOST = Colour("--lost", "rgba(213, 94, 0, 0.25)", "rgba(232, 119, 58, 0.3)")
+"""Fill behind a stretch without samples."""
+COLOURS = (INK, QUIET, LINE, BLUE, VERMILLION, GREEN, PURPLE, BAND, SHADE, WET, SNOW, LOST)
 
 SOLID: tuple[int, ...] = ()
 DASHED, DOTTED, DASH_DOT, LONG_DASHED = (7, 4), (2, 3), (8, 3, 2, 3), (12, 4)

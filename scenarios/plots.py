@@ -294,7 +294,8 @@ def png(figure: Figure, title: str = "", width_in: float = WIDTH_IN, row_in: flo
         axes = sheet.subplots(len(heights), 1, sharex=figure.linked, height_ratios=heights, squeeze=False)
         for axis, panel in zip(axes[:, 0], figure.panels, strict=True):
             _draw(axis, panel)
-        axes[-1, 0].set_xlabel(_plain(figure.panels[-1].x_label))
+            if not figure.linked or panel is figure.panels[-1]:
+                axis.set_xlabel(_plain(panel.x_label))
         if title:
             sheet.suptitle(_plain(title), fontsize=9)
         sheet.align_ylabels(axes[:, 0])

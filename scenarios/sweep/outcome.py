@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
 
 from scenarios.sweep.execute import Failure
-from scenarios.sweep.summary import ENOUGH_SHOWN_S, shown_enough, slippery
+from scenarios.sweep.summary import shown_enough, slippery
 
 MAIN = ("robust", "DIFE")
 """The estimator that the first sentence is about: the first of these that ran, else the last of the sweep."""
@@ -75,22 +76,31 @@ def outcome(table: pd.DataFrame, failures: list[Failure]) -> Outcome:
 
 def _unconverged(rows: pd.DataFrame, never: pd.DataFrame) -> Unconverged:
     """A run of its rows, one per stretch, and those of them on which it never converged."""
-    first, missed = rows.iloc[0], rows.index.isin(never.index)
-    level = f"{first['parameter']} = {first['level']:g}" if first["parameter"] else "not varied"
-    road = [
-        f"{row.surface.replace('_', ' or ')} {row.theta:.2f}{' (not reached)' if miss else ''}"
-        for row, miss in zip(rows.itertuples(), missed, strict=True)
+    stretches: list[dict[str, Any]] = [
+        {str(key): value for key, value in row.items()} for row in rows.to_dict("records")
     ]
-    why = "; ".join(_why(row) for row in rows[missed].itertuples())
-    return Unconverged(int(first["run"]), level, int(first["seed"]), ", ".join(road), why)
+    missed = [row for row, index in zip(stretches, rows.index, strict=True) if index in never.index]
+    first = stretches[0]
+    road = (
+        f"{row['surface'].replace('_', ' or ')} {row['theta']:.2f}{' (not reached)' if any(row is m for m in missed) else ''}"
+        for row in stretches
+    )
+    return Unconverged(
+        run=first["run"],
+        level=f"{first['parameter']} = {first['level']:g}" if first["parameter"] else "not varied",
+        seed=first["seed"],
+        road=", ".join(road),
+        why="; ".join(map(_why, missed)),
+    )
 
 
-def _why(row: Any) -> str:
+def _why(row: dict[str, Any]) -> str:
     """Why an estimate did not converge on a stretch, as far as its row says."""
-    if row.excited_time_s == 0.0:
+    if row["excited_time_s"] == 0.0:
         return "the slip stayed below the estimator's threshold"
-    side = "above" if row.error_end > 0.0 else "below"
-    text = f"cause not known: excited for {row.excited_time_s:.2f} s, {abs(row.error_end):.3f} {side} the true value at the end"
-    if row.covered_end == row.covered_end:  # an estimator without a standard deviation has NaN
-        text += f", {'within' if row.covered_end else 'outside'} 2 TRPAC_std"
+    off = row["error_end"]
+    text = f"cause not known: excited for {row['excited_time_s']:.2f} s, {abs(off):.3f} "
+    text += f"{'above' if off > 0.0 else 'below'} the true value at the end"
+    if not math.isnan(row["covered_end"]):  # NaN without a standard deviation
+        text += f", {'within' if row['covered_end'] else 'outside'} 2 TRPAC_std"
     return text

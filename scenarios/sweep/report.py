@@ -50,6 +50,8 @@ def _figures(table: pd.DataFrame) -> list[tuple[str, str, Figure]]:
     caption = "Share of time with the true value within 2 TRPAC_std."
     shown.append(("Coverage of TRPAC_std", caption, figures.coverage(table)))
     for parameter, figure in figures.degradations(table):
-        caption = "Slippery stretches on which the tyre showed its friction; the last plot: all time on slippery stretches."
+        caption = (
+            "Slippery stretches on which the tyre showed its friction; the last plot: all slippery stretches."
+        )
         shown.append((f"Degradation over {parameter}", caption, figure))
     return shown

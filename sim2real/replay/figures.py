@@ -62,9 +62,9 @@ def estimate(done: Replay) -> Figure:
 def _flags(done: Replay) -> Panel:
     """Strips: slip above the threshold, tyre seen, camera used."""
     flags = {
-        "camera": done.flag.any(axis=1),
-        "tyre": done.seen.any(axis=1),
-        "excited": done.ours.excited.any(axis=1),
+        "camera": np.any(done.flag, axis=1),
+        "tyre": np.any(done.seen, axis=1),
+        "excited": np.any(done.ours.excited, axis=1),
     }
     series = strips(done.inputs.time_s, flags, (Style(PURPLE), Style(BLUE), Style(QUIET)))
     empty = "no flag was ever set: no tyre slipped above its threshold, and no class of a camera was used."

@@ -97,7 +97,8 @@ def sentences(summary: dict[str, Any]) -> list[str]:
     theta, std, low, high = (driven[f"{n}_end"] for n in ("TRPAC", "TRPAC_std", "TRPAC_low", "TRPAC_high"))
     first, *wide = known.sentences(theta, std, *known.interval(method, theta, std, low, high))
     found = [f"At the end: {first}", *wide]
-    shown = f"The car drove for {said['driven_s']:.1f} s; the tyres showed the road for {percent(said['seen_share'])} of it"
+    share = percent(said["seen_share"])
+    shown = f"The car drove for {said['driven_s']:.1f} s; the tyres showed the road for {share} of it"
     if not said["excited_share"]:
         shown += (
             ", since no tyre slipped above its threshold: brake or accelerate harder, up to a slip of 0.02"

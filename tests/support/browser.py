@@ -25,7 +25,8 @@ WIDER = """() => {
   const width = document.documentElement.clientWidth;
   if (document.documentElement.scrollWidth <= width) return "";
   const wide = [...document.body.querySelectorAll("*")].filter(e => e.getBoundingClientRect().right > width + 1);
-  return `${document.documentElement.scrollWidth} px wide: ` + wide.slice(0, 3).map(e => e.outerHTML.slice(0, 80)).join(" | ");
+  const shown = wide.slice(0, 3).map(e => e.outerHTML.slice(0, 80));
+  return `${document.documentElement.scrollWidth} px wide: ${shown.join(" | ")}`;
 }"""
 
 
