@@ -36,6 +36,7 @@ COLOURS = (INK, QUIET, LINE, BLUE, VERMILLION, GREEN, PURPLE, BAND, SHADE, WET, 
 
 SOLID: tuple[int, ...] = ()
 DASHED, DOTTED, DASH_DOT, LONG_DASHED = (7, 4), (2, 3), (8, 3, 2, 3), (12, 4)
+DASH_DOT_DOT = (8, 3, 2, 3, 2, 3)
 """Lengths of dashes and gaps [px]."""
 MARKERS = {"circle": "o", "square": "s", "diamond": "D", "triangle-up": "^", "x": "x", "cross": "P"}
 """Markers by their names in plotly and in matplotlib."""
@@ -81,7 +82,7 @@ WHEEL_STYLES = dict(
 ESTIMATOR_STYLES = {
     "robust": Style(BLUE, SOLID, "circle", 2.0),
     "DIFE": Style(VERMILLION, DASHED, "square", 2.0),
-    "as printed": Style(VERMILLION, DASH_DOT, "cross", 2.0),
+    "as printed": Style(VERMILLION, DASH_DOT_DOT, "cross", 2.0),
     "DE": Style(GREEN, DASH_DOT, "diamond"),
     "IFE": Style(PURPLE, DOTTED, "triangle-up", 2.2),
 }

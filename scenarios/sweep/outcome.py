@@ -53,11 +53,15 @@ class Outcome:
     @property
     def sentence(self) -> str:
         """The counts."""
-        parts = [f"{len(self.unconverged):,} never converged ({self.estimator})"]
+        parts = []
+        if self.unconverged:
+            parts.append(f"{len(self.unconverged):,} never converged ({self.estimator})")
+        elif self.runs > len(self.unjudged) + len(self.failures):
+            parts.append(f"every judged run converged ({self.estimator})")
         if self.unjudged:
             parts.append(f"{len(self.unjudged):,} could not be judged")
         parts.append(f"{len(self.failures):,} failed with an error" if self.failures else "none failed")
-        return f"Of {self.runs:,} runs: {', '.join(parts)}."
+        return f"Of {self.runs:,} run{'s' if self.runs > 1 else ''}: {', '.join(parts)}."
 
 
 def outcome(table: pd.DataFrame, failures: list[Failure]) -> Outcome:

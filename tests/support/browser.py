@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
@@ -17,7 +18,7 @@ ARGUMENTS = [
     "--no-first-run",
 ]
 WIDTHS = (390, 1440)
-SCHEMES = ("light", "dark")
+SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 SERIOUS = ("serious", "critical")
 HEIGHT = 900
 
@@ -49,41 +50,40 @@ def problems(pages: Iterable[tuple[str, Path]], pictures: Path | None = None) ->
         Folder for a picture of each page as it was looked at.
     """
     from axe_playwright_python.sync_playwright import Axe
-    from playwright.sync_api import sync_playwright
+    from playwright.sync_api import ViewportSize, sync_playwright
 
     found: list[str] = []
     with sync_playwright() as started:
         browser = started.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
         try:
-            for width in WIDTHS:
-                for scheme in SCHEMES:
-                    context = browser.new_context(
-                        viewport={"width": width, "height": HEIGHT}, color_scheme=scheme, offline=True
+            for name, path in pages:
+                for width in WIDTHS:
+                    size: ViewportSize = {"width": width, "height": HEIGHT}
+                    context = browser.new_context(viewport=size, color_scheme=SCHEMES[0], offline=True)
+                    page, where = context.new_page(), [f"{name} at {width} px"]
+                    page.on("pageerror", lambda error, where=where: found.append(f"{where[0]}: {error}"))
+                    page.on(
+                        "request", lambda request, where=where: found.extend(_foreign(request.url, where[0]))
                     )
-                    for name, path in pages:
-                        where = f"{name} at {width} px, {scheme}"
-                        page = context.new_page()
-                        page.on("pageerror", lambda error, where=where: found.append(f"{where}: {error}"))
-                        page.on(
-                            "request",
-                            lambda request, where=where: (
-                                None
-                                if request.url.startswith(("file:", "data:", "blob:"))
-                                else found.append(f"{where}: asks for {request.url}")
-                            ),
-                        )
-                        page.goto(path.resolve().as_uri())
+                    page.goto(path.resolve().as_uri())
+                    for scheme in SCHEMES:
+                        page.emulate_media(color_scheme=scheme)
+                        where[0] = f"{name} at {width} px, {scheme}"
                         if wider := page.evaluate(WIDER):
-                            found.append(f"{where}: {wider}")
-                        for violation in Axe().run(page).response["violations"]:
-                            if violation["id"] == "color-contrast" or violation["impact"] in SERIOUS:
-                                nodes = [n["html"][:120] for n in violation["nodes"][:3]]
-                                found.append(f"{where}: {violation['id']} ({violation['help']}): {nodes}")
+                            found.append(f"{where[0]}: {wider}")
+                        for broken in Axe().run(page).response["violations"]:
+                            if broken["id"] == "color-contrast" or broken["impact"] in SERIOUS:
+                                nodes = [n["html"][:120] for n in broken["nodes"][:3]]
+                                found.append(f"{where[0]}: {broken['id']} ({broken['help']}): {nodes}")
                         if pictures is not None:
                             pictures.mkdir(parents=True, exist_ok=True)
                             page.screenshot(path=pictures / f"{name}_{width}_{scheme}.png", full_page=True)
-                        page.close()
                     context.close()
         finally:
             browser.close()
     return found
+
+
+def _foreign(address: str, where: str) -> list[str]:
+    """The problem of a request that leaves the page's own files."""
+    return [] if address.startswith(("file:", "data:", "blob:")) else [f"{where}: asks for {address}"]
