@@ -18,7 +18,7 @@ class Colour:
 
 
 INK = Colour("--ink", "#1d2125", "#e6e7e9")
-QUIET = Colour("--quiet", "#5a6068", "#a9afb8")
+GREY = Colour("--grey", "#5a6068", "#a9afb8")
 LINE = Colour("--line", "#dcdfe3", "#3a3e44")
 BLUE = Colour("--blue", "#0072b2", "#56b4e9")
 VERMILLION = Colour("--vermillion", "#d55e00", "#e8773a")
@@ -32,7 +32,7 @@ WET = Colour("--wet", "rgba(0, 114, 178, 0.16)", "rgba(86, 180, 233, 0.22)")
 SNOW = Colour("--snow", "rgba(86, 180, 233, 0.07)", "rgba(230, 240, 255, 0.09)")
 LOST = Colour("--lost", "rgba(213, 94, 0, 0.25)", "rgba(232, 119, 58, 0.3)")
 """Fill behind a stretch without samples."""
-COLOURS = (INK, QUIET, LINE, BLUE, VERMILLION, GREEN, PURPLE, BAND, SHADE, WET, SNOW, LOST)
+COLOURS = (INK, GREY, LINE, BLUE, VERMILLION, GREEN, PURPLE, BAND, SHADE, WET, SNOW, LOST)
 
 SOLID: tuple[int, ...] = ()
 DASHED, DOTTED, DASH_DOT, LONG_DASHED = (7, 4), (2, 3), (8, 3, 2, 3), (12, 4)
@@ -88,11 +88,11 @@ ESTIMATOR_STYLES = {
 }
 OTHER_STYLES = (
     Style(INK, DOTTED, "x"),
-    Style(QUIET, DASHED, "cross"),
+    Style(GREY, DASHED, "cross"),
     Style(PURPLE, SOLID, "square"),
     Style(GREEN, LONG_DASHED, "circle"),
     Style(INK, DASH_DOT, "diamond"),
-    Style(QUIET, SOLID, "triangle-up"),
+    Style(GREY, SOLID, "triangle-up"),
     Style(BLUE, DOTTED, "x"),
     Style(VERMILLION, LONG_DASHED, "diamond"),
 )
@@ -111,10 +111,10 @@ MATPLOTLIB: dict[Any, Any] = {
     "font.size": 9.0,
     "font.family": "DejaVu Sans",
     "axes.spines.top": False,
-    "axes.edgecolor": QUIET.light,
+    "axes.edgecolor": GREY.light,
     "axes.labelcolor": INK.light,
-    "xtick.color": QUIET.light,
-    "ytick.color": QUIET.light,
+    "xtick.color": GREY.light,
+    "ytick.color": GREY.light,
     "axes.grid": True,
     "grid.color": LINE.light,
     "axes.axisbelow": True,

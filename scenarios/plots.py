@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.plot_style import INK, LINE, MARKERS, MATPLOTLIB, QUIET, SHADE, Colour, Style
+from scenarios.plot_style import INK, LINE, MARKERS, MATPLOTLIB, GREY, SHADE, Colour, Style
 from trpac_core.files import quoted
 
 Array = NDArray[Any]
@@ -122,10 +122,10 @@ class Panel:
     @property
     def spec(self) -> dict[str, Any]:
         """The panel for plotly; colours are names of CSS variables."""
-        traces: list[dict[str, Any]] = []
+        curves: list[dict[str, Any]] = []
         for number, series in enumerate(self.shown):
-            traces += [trace | {"legendgroup": str(number)} for trace in _traces(series)]
-        return {"data": traces, "layout": _layout(self)}
+            curves += [curve | {"legendgroup": str(number)} for curve in _of_plotly(series)]
+        return {"data": curves, "layout": _layout(self)}
 
 
 @dataclass(frozen=True)
@@ -181,8 +181,8 @@ def strips(time_s: Array, flags: Mapping[str, Array], styles: Iterable[Style]) -
     return tuple(made)
 
 
-def _traces(series: Series) -> list[dict[str, Any]]:
-    """The series as traces of plotly: a band has two."""
+def _of_plotly(series: Series) -> list[dict[str, Any]]:
+    """The series as curves of plotly: a band has two."""
     style, y = series.style, np.asarray(series.y, dtype=float)
     x = np.asarray(series.x, dtype=float)
     line: dict[str, Any] = {
@@ -227,7 +227,7 @@ def _packed(values: Array, kind: str) -> dict[str, str]:
 
 def _layout(panel: Panel) -> dict[str, Any]:
     """The layout of a panel for plotly."""
-    axis = {"gridcolor": LINE.name, "zerolinecolor": LINE.name, "linecolor": QUIET.name, "automargin": False}
+    axis = {"gridcolor": LINE.name, "zerolinecolor": LINE.name, "linecolor": GREY.name, "automargin": False}
     label = html.escape(quoted(panel.x_label), quote=False)
     x = axis | {"title": {"text": label, "standoff": 6}, "type": "log" if panel.x_log else "linear"}
     y = axis | {"type": "log" if panel.y_log else "linear", "fixedrange": True, "nticks": 6}
@@ -309,8 +309,8 @@ def _draw(axis: Any, panel: Panel) -> None:
         ground, alpha = _opaque(shade.colour)
         axis.axvspan(shade.start, shade.end, color=ground, alpha=alpha, lw=0, zorder=-10)
         if shade.text:
-            place = {"transform": axis.get_xaxis_transform(), "ha": "center", "va": "top", "fontsize": 8}
-            axis.text(0.5 * (shade.start + shade.end), 0.98, shade.text.replace("$", r"\$"), **place)
+            layout = {"transform": axis.get_xaxis_transform(), "ha": "center", "va": "top", "fontsize": 8}
+            axis.text(0.5 * (shade.start + shade.end), 0.98, shade.text.replace("$", r"\$"), **layout)
     right = axis.twinx() if panel.right_label else axis
     if panel.right_label:
         right.set_ylabel(_plain(panel.right_label))

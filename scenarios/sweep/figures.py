@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pandas as pd
 
-from scenarios.plot_style import DASHED, INK, QUIET, SHADE, Style, estimator_styles
+from scenarios.plot_style import DASHED, INK, GREY, SHADE, Style, estimator_styles
 from scenarios.plots import Figure, Panel, Series
 from scenarios.sweep.summary import COVERAGE_SPAN, ENOUGH_SHOWN_S, quantile, shown_enough, slippery
 
@@ -66,7 +66,7 @@ def errors_by_friction(table: pd.DataFrame) -> Figure:
         rows = table[table["estimator"] == name]
         enough = rows["shown_s"] >= ENOUGH_SHOWN_S
         series = [
-            _errors("shown too briefly", rows[~enough], Style(QUIET, marker="x")),
+            _errors("shown too briefly", rows[~enough], Style(GREY, marker="x")),
             _errors("shown", rows[enough], Style(style.colour)),
         ]
         goal = Series(

@@ -11,7 +11,7 @@ from scenarios.plot_style import (
     BLUE,
     PLAIN,
     PURPLE,
-    QUIET,
+    GREY,
     TRUTH,
     WHEEL_STYLES,
     Style,
@@ -66,7 +66,7 @@ def _flags(done: Replay) -> Panel:
         "tyre": np.any(done.seen, axis=1),
         "excited": np.any(done.ours.excited, axis=1),
     }
-    series = strips(done.inputs.time_s, flags, (Style(PURPLE), Style(BLUE), Style(QUIET)))
+    series = strips(done.inputs.time_s, flags, (Style(PURPLE), Style(BLUE), Style(GREY)))
     empty = "no flag was ever set: no tyre slipped above its threshold, and no class of a camera was used."
     ticks = {float(row): name for row, name in enumerate(flags)}
     return _over_time(done, "flags", empty, *series, y_limits=(-0.6, 2.6), ticks=ticks, height=0.5)

@@ -123,7 +123,7 @@ class TestStyles:
         for colour in COLOURS:
             value = getattr(colour, side)
             if value.startswith("#") and colour.name != "--line":
-                least = 4.5 if colour.name in ("--ink", "--quiet") else 3.0
+                least = 4.5 if colour.name in ("--ink", "--grey") else 3.0
                 assert contrast(value, paper) >= least, colour
 
     def test_no_colour_is_named_elsewhere(self):

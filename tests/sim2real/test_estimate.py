@@ -138,7 +138,7 @@ class TestCommand:
     def test_it_says_what_it_found(self, estimated):
         said = " ".join(estimated[1].stdout.split())
         assert "the tyres showed the road for" in said
-        assert said.startswith(require_report((estimated[0] / "report.html").read_text()).verdict)
+        assert require_report((estimated[0] / "report.html").read_text()).verdict in said
         assert "TRPAC_peak against mu_reference" in said
 
     @pytest.mark.parametrize("method", ["as_printed", "robust"])
