@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from trpac_core.estimator_data import Method
 from trpac_core.vision.classes import CLASS_THETA, Surface
 
@@ -14,8 +16,8 @@ that the estimator has for these classes [-]."""
 
 
 def interval(method: Method, theta: Any, std: Any, low: Any, high: Any) -> tuple[Any, Any]:
-    """The 95 % interval of estimates: its own for `robust`, two deviations to either side for the others."""
-    return (low, high) if method is Method.ROBUST else (theta - 2.0 * std, theta + 2.0 * std)
+    """The 95 % interval of estimates: its own for `robust`, two deviations to either side, from 0, for the others."""
+    return (low, high) if method is Method.ROBUST else (np.maximum(theta - 2.0 * std, 0.0), theta + 2.0 * std)
 
 
 def is_known(low: Any, high: Any) -> Any:

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.plot_style import INK, LINE, MARKERS, MATPLOTLIB, GREY, SHADE, Colour, Style
+from scenarios.plot_style import GREY, INK, LINE, MARKERS, MATPLOTLIB, SHADE, Colour, Style
 from trpac_core.files import quoted
 
 Array = NDArray[Any]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pandas as pd
 
-from scenarios.plot_style import DASHED, INK, GREY, SHADE, Style, estimator_styles
+from scenarios.plot_style import DASHED, GREY, INK, SHADE, Style, estimator_styles
 from scenarios.plots import Figure, Panel, Series
 from scenarios.sweep.summary import COVERAGE_SPAN, ENOUGH_SHOWN_S, quantile, shown_enough, slippery
 
