@@ -127,7 +127,7 @@ def _flags(table: pd.DataFrame, time: np.ndarray) -> tuple[Panel, Panel, Panel]:
         "no picture gave a class of the road under the wheel.",
         (
             Series(
-                "visual flag", time, np.where(seen, flag.to_numpy(float), np.nan), Style(SHADE), "step", none
+                "visual flag", time, np.where(seen, flag.to_numpy(float), np.nan), Style(PURPLE), "step", none
             ),
             Series("Q_v", time, np.where(seen, q_v, np.nan), PLAIN),
         ),

@@ -85,10 +85,10 @@ def _unconverged(rows: pd.DataFrame, never: pd.DataFrame) -> Unconverged:
     ]
     missed = [row for row, index in zip(stretches, rows.index, strict=True) if index in never.index]
     first = stretches[0]
-    road = (
-        f"{row['surface'].replace('_', ' or ')} {row['theta']:.2f}{' (not reached)' if any(row is m for m in missed) else ''}"
-        for row in stretches
-    )
+    road = []
+    for row, index in zip(stretches, rows.index, strict=True):
+        reached = "" if index not in never.index else " (not reached)"
+        road.append(f"{row['surface'].replace('_', ' or ')} {row['theta']:.2f}{reached}")
     return Unconverged(
         run=first["run"],
         level=f"{first['parameter']} = {first['level']:g}" if first["parameter"] else "not varied",
