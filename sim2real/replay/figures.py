@@ -97,10 +97,10 @@ def estimate(done: Replay) -> bytes:
 
 
 def _flags(axis: Axes, done: Replay) -> None:
-    """Strips: slip above the threshold, tyre seen, camera used."""
+    """Strips: slip above the threshold, moved by tyre, camera used."""
     strips = (
         ("camera used", done.flag.any(axis=1), BEFORE),
-        ("tyre seen", done.seen.any(axis=1), AFTER),
+        ("moved by tyre", done.seen.any(axis=1), AFTER),
         ("excited", done.ours.excited.any(axis=1), FLOOR),
     )
     for height, (_, rows, colour) in enumerate(strips):
