@@ -97,10 +97,10 @@ def estimate(done: Replay) -> bytes:
 
 
 def _flags(axis: Axes, done: Replay) -> None:
-    """Strips: slip above the threshold, moved by tyre, camera used."""
+    """Strips: slip above the threshold, tyre seen, camera used."""
     strips = (
         ("camera used", done.flag.any(axis=1), BEFORE),
-        ("moved by tyre", done.seen.any(axis=1), AFTER),
+        ("tyre seen", done.seen.any(axis=1), AFTER),
         ("excited", done.ours.excited.any(axis=1), FLOOR),
     )
     for height, (_, rows, colour) in enumerate(strips):

@@ -1,4 +1,4 @@
-"""estimates.csv, summary.json and report.html: the results of a replay, for programs and for readers."""
+"""estimates.csv, summary.json and report.html: what a replay says, for machines and for people."""
 
 from __future__ import annotations
 
@@ -21,11 +21,9 @@ from trpac_core.vehicle import WHEELS
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
 CSV_NAME, SUMMARY_NAME, REPORT_NAME = "estimates.csv", "summary.json", "report.html"
 HARDLY = 0.01
-"""Share of the driving below which the tyre forces count as without effect on the estimate [-]."""
+"""Share of the driving below which the tyre counts as not seen [-]."""
 WIDE_STD = 0.15
-"""Mean standard deviation above which an estimate is only an indication [-]."""
-UNKNOWN = 0.5
-"""Width of the interval above which the friction counts as not known [-]."""
+"""Mean standard deviation above which an estimate says little [-]."""
 
 
 def estimates_table(done: Replay) -> pd.DataFrame:
@@ -98,42 +96,29 @@ def render(done: Replay, summary: dict[str, Any]) -> str:
 
 
 def verdict(summary: dict[str, Any]) -> str:
-    """Results of the drive in sentences that follow from its numbers."""
-    driven, found = summary["excitation"], summary["estimate"]
+    """What the log showed, in sentences that follow from its numbers."""
+    said, driven = summary["excitation"], summary["estimate"]
     sentences = [
-        f"The car drove for {driven['driven_s']:.1f} s. "
-        f"The tyre forces moved the estimate during {percent(driven['seen_share'])} of this time."
+        f"The car drove for {said['driven_s']:.1f} s; "
+        f"the tyres showed the road for {percent(said['seen_share'])} of it."
     ]
-    if driven["seen_share"] < HARDLY and driven["camera_share"] < HARDLY:
+    if said["seen_share"] < HARDLY and said["camera_share"] < HARDLY:
         sentences.append(
-            "The estimate is therefore close to its start value. To measure the friction, brake or accelerate up to a "
-            "slip of 0.02 or more."
+            "So the estimate is hardly more than its start value: brake or accelerate harder, up to a slip of 0.02."
         )
-    if found["mean_std_seen"] is not None and found["mean_std_seen"] > WIDE_STD:
-        sentences.append(
-            f"Its mean standard deviation during this time is {found['mean_std_seen']:.2f}: the value is only an "
-            "indication."
-        )
-    sentences.append(_end(found, Method.of(summary["method"])))
+    sentences.append(
+        f"TRPAC at the end is {driven['TRPAC_end']:.2f} with a standard deviation of {driven['TRPAC_std_end']:.2f}."
+    )
+    if driven["mean_std_seen"] is not None and driven["mean_std_seen"] > WIDE_STD:
+        sentences.append("Its deviation is wide even where the tyre is seen: take it as a hint.")
     ours = Method.of(summary["method"]).title
     error = (summary["errors"] or {}).get(ours, {}).get("seen", {})
     if error.get("mean_abs") is not None:
         sentences.append(
-            f"Where the tyre forces moved the estimate, TRPAC_peak differs from mu_reference by {error['mean_abs']:.3f} on "
-            f"average, and {percent(error['within_2_std'])} of these rows lie within two standard deviations."
+            f"Where the tyre is seen, TRPAC_peak is {error['mean_abs']:.3f} off the reference in the mean, and "
+            f"{percent(error['within_2_std'])} of these rows lie within two standard deviations."
         )
     return " ".join(sentences)
-
-
-def _end(found: dict[str, Any], method: Method) -> str:
-    """The estimate at the end, and its interval where the method states one."""
-    low, high, value = found["TRPAC_low_end"], found["TRPAC_high_end"], found["TRPAC_end"]
-    if method is Method.AS_PRINTED or not np.isfinite((low, high)).all():
-        return f"At the end TRPAC is {value:.2f}."
-    span = f"{low:.2f} to {high:.2f}"
-    if high - low > UNKNOWN:
-        return f"At the end the friction is not known: TRPAC is within {span} (95 % interval)."
-    return f"At the end TRPAC is {value:.2f}, within {span} (95 % interval)."
 
 
 def number(value: float | None, digits: int = 3) -> str:
