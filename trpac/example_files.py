@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +74,7 @@ def example(folder: str | Path, progress: Progress = silent) -> tuple[Path, ...]
             ("road", ROAD, "road"),
             ("camera", CAMERA, "camera"),
         ):
-            (made / f"{file}.yaml").write_bytes(located(kind, name).read_bytes())
+            shutil.copyfile(located(kind, name), made / f"{file}.yaml")
         drive.to_csv(made / "drive.csv", index=False)
         _foreign(drive).to_csv(made / "foreign.csv", index=False)
         (made / "mapping.yaml").write_text(_mapping(), encoding="utf-8")
