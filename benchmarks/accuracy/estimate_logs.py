@@ -150,7 +150,7 @@ def _ucd_vehicle() -> VehicleFile:
 
 
 def with_classes(d: Drive) -> Replay:
-    """Our estimator with a camera that is always right: the class nearest to the truth, from a preview distance ahead."""
+    """Our estimator with a camera that is always right: the class nearest to the truth, a preview distance ahead."""
     preview = PreviewConfig()
     place = np.nan_to_num(d.inputs.position_m)
     every = max(round(CAMERA_PERIOD_S / d.inputs.step_s), 1)

@@ -227,5 +227,7 @@ def _warnings(log: Log, locked: NDArray[np.bool_], step_s: float) -> tuple[str, 
         )
     constant = sorted(name for name in log.derived if name.startswith("wheel_torque"))
     if constant:
-        said.append(f"{', '.join(constant)}: not measured, so there is no estimate from tyre forces at that wheel.")
+        said.append(
+            f"{', '.join(constant)}: not measured, so there is no estimate from tyre forces at that wheel."
+        )
     return tuple(said)
