@@ -50,7 +50,7 @@ def sweep(
 
     If it is stopped, call it again with the same folder: finished runs are kept.
 
-    Example: trpac sweep paper_simulation --out out/sweep
+    Example: trpac sweep paper_simulation --runs 10 --out out/sweep
 
     Guide: docs/guide/sweep.md.
 

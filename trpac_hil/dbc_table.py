@@ -24,8 +24,8 @@ signals then count as lost until 1 s after the last sign of it.
 In the tables, "bits" are start bit and length; `u` is unsigned, `i` signed. "N/A" is the raw value that means "not
 available".
 """
-_PLACE = re.compile(r"_(FL|FR|RL|RR|Left|Right)$")
-_PLACE_IN_WORDS = re.compile(r"\b((front|rear) )?(left|right) ")
+_WHEEL_OR_SIDE = re.compile(r"_(FL|FR|RL|RR|Left|Right)$")
+_WHEEL_OR_SIDE_WORDS = re.compile(r"\b((front|rear) )?(left|right) ")
 
 
 def document() -> str:
@@ -37,7 +37,7 @@ def document() -> str:
 def _section(message: Message) -> str:
     groups: dict[str, list[Signal]] = {}
     for signal in message.signals:
-        groups.setdefault(_PLACE.sub("_", signal.name), []).append(signal)
+        groups.setdefault(_WHEEL_OR_SIDE.sub("_", signal.name), []).append(signal)
     rows = "\n".join(_row(group) for group in groups.values())
     limits = {
         str(s.dbc.attributes[STALE_AFTER].value)
@@ -56,11 +56,11 @@ def _section(message: Message) -> str:
 def _row(group: list[Signal]) -> str:
     """A row for a signal, or for those of all wheels or sides, which differ in their start bits only."""
     first = group[0]
-    names = ", ".join(f"`{s.name}`" if s is first else f"`{_place(s)}`" for s in group)
+    names = ", ".join(f"`{s.name}`" if s is first else f"`{_suffix(s)}`" for s in group)
     values = {raw: str(name) for raw, name in (first.choices or {}).items()}
     missing = ", ".join(f"{raw}" for raw, name in values.items() if name == NOT_AVAILABLE)
     named = ", ".join(f"{raw} {name}" for raw, name in values.items() if name != NOT_AVAILABLE)
-    meaning = first.comment if len(group) == 1 else _PLACE_IN_WORDS.sub("", f"{first.comment}")
+    meaning = first.comment if len(group) == 1 else _WHEEL_OR_SIDE_WORDS.sub("", f"{first.comment}")
     starts = ", ".join(f"{s.start}" for s in group)
     sign = "i" if first.is_signed else "u"
     return (
@@ -69,8 +69,8 @@ def _row(group: list[Signal]) -> str:
     )
 
 
-def _place(signal: Signal) -> str:
-    found = _PLACE.search(signal.name)
+def _suffix(signal: Signal) -> str:
+    found = _WHEEL_OR_SIDE.search(signal.name)
     return found.group(0) if found else signal.name
 
 

@@ -330,7 +330,7 @@ def test_a_signal_that_is_missing_is_named_also_where_its_table_of_values_is_sti
         ([], [("counters:", "checksums: {Motion: Crc}\ncounters:")], "checksums"),
         ([], [("Motion: AliveCnt", "Motion: VehSpd")], "VehSpd does not count by one from 0"),
         ([("BO_ 700 ", "BO_ 512 ")], [], "Estimate is sent with the identifier 0x200 of trpac.dbc, which is that of"),
-        ([("BO_ 701 Brakes", "BO_ 700 Brakes")], [], "is there twice: Drive 0x2BC, Brakes 0x2BC"),
+        ([("BO_ 701 Brakes", "BO_ 700 Brakes")], [], "occurs twice: Drive 0x2BC, Brakes 0x2BC"),
         ([("BO_ 900 Health", "BO_ 900 Drive")], [], "Drive cannot be used"),
         ([("(0.001,0) [-4|4]", "(0,0) [-4|4]")], [], "Motion cannot be used"),
         ([("VehSpd 65535", "VehSpd 165535")], [], "Motion cannot be used"),

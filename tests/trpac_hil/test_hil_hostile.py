@@ -405,7 +405,7 @@ def test_the_loop_holds_with_flag_0_while_two_send_and_goes_on_afterwards(name: 
     assert set(status[2200:]) == {RUNNING}
     assert set(bench.sent("Flag")[first:1750]) == {0.0}
     assert bench.events.kinds[f"two senders {name}"].count == 1
-    assert "Take one off the bus" in bench.events.kinds[f"two senders {name}"].text
+    assert "Remove one from the bus" in bench.events.kinds[f"two senders {name}"].text
 
 
 # Lengths
