@@ -1,4 +1,4 @@
-"""The one way to files of others: regular, of a bounded size, and quoted in messages as short, plain text."""
+"""Reading of foreign files: regular files of bounded size, quoted in messages as short, plain text."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ class FourWheelsConfig:
 
 
 class CarEstimate(NamedTuple):
-    """What the estimators say at a step."""
+    """Outputs of the estimators at a step."""
 
     wheels: tuple[Estimate, Estimate, Estimate, Estimate]
     TRPAC: float
@@ -262,7 +262,7 @@ def car_claim(
 
 
 class FourWheels:
-    """Four one-wheel estimators that share a camera; each goes on where another's sensors fail.
+    """Four one-wheel estimators that share a camera; each continues when the sensors of another fail.
 
     A picture is segmented once; the patches of the left and of the right track are classified in one run, and each
     side's verdict goes to its two wheels. A rear wheel reaches the road that was seen a wheelbase later.
@@ -371,7 +371,7 @@ class FourWheels:
     def _classes(
         self, sensors: CarSensors, frame: NDArray[np.uint8] | SideClasses | None
     ) -> tuple[RoadClass | None, RoadClass | None]:
-        """What a new frame says of the left and of the right track; nothing where the car's motion is not known."""
+        """Results of a new frame for the left and the right track; none where the motion of the car is unknown."""
         if frame is None or isinstance(frame, SideClasses):
             return frame or (None, None)
         if self._ife is None:
@@ -395,7 +395,7 @@ class FourWheels:
         return RoadClass(result.surface, result.told_by_bus(self.config.wheel.vision.flag_threshold))
 
     def messages(self) -> dict[str, str]:
-        """Sentences on what the drive shows of a car that is not as told, once per axle and matter."""
+        """Warnings about a car that differs from its description, once per axle and subject."""
         fl, fr, rl, rr = (wheel.messages() for wheel in self._wheels)
         return fr | fl | rr | rl
 

@@ -1,4 +1,4 @@
-"""The speed of the road under each wheel of a car that turns: what a wheel slips against in a curve."""
+"""The speed of the road under each wheel of a turning car, the reference of slip in a curve."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def settled_state(
 
 
 def seen_at(x: float) -> float:
-    """Share of the way over a step at which an input that changes evenly counts for Eq. (15), x = K dt. [-].
+    """Share of the step at which an input that changes linearly counts for Eq. (15), x = K dt. [-].
 
     The mean of t / dt over the step, weighted as the observer forgets, with exp(-K (dt - t)): half of the way for short
     steps, the end of long ones.

@@ -1,4 +1,4 @@
-"""The three methods of the estimator: bounds on all inputs, state, source, and a car that is not as told."""
+"""The three methods of the estimator: bounds on all inputs, state, source, and a wrong description of the car."""
 
 import json
 import math
@@ -179,7 +179,7 @@ def test_as_printed_it_remembers_no_road():
     assert estimator.step(0.01, CRUISE).source is Source.NONE
 
 
-# A car that is not as told
+# A car that differs from its description
 
 
 def messages_of(seconds=8.0, method=Method.ROBUST, front=True, **drive):

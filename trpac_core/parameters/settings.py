@@ -86,7 +86,7 @@ _FUSION_PARAMETERS = (
         0.02,
         GREATEST_THETA,
     ),
-    parameter("estimator.floor_speed", "m/s", "floor_m_s", "Speed below which slip says nothing", 0.01),
+    parameter("estimator.floor_speed", "m/s", "floor_m_s", "Speed below which slip is not used", 0.01),
     parameter(
         "estimator.sensor_filter", "s", "sensor_filter_s", "Time constant of the filter on the sensors", 1e-9
     ),

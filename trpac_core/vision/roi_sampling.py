@@ -1,4 +1,4 @@
-"""Which patches of road are looked at: corners in the ellipses, shadow removal, sampling (Figure 8)."""
+"""Choice of the patches of road: corners in the ellipses, shadow removal, sampling (Figure 8)."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ class Corners:
 
     @property
     def n_ell(self) -> int:
-        """Corners of the group that the picture shows."""
+        """Number of corners of the group that the picture shows."""
         return len(self.usable)
 
     @property
     def n_rs(self) -> int:
-        """Corners of the group that are of no use: shadowed, or not drivable."""
+        """Number of unusable corners of the group: shadowed, or not drivable."""
         return self.n_ell - int(np.count_nonzero(self.usable))
 
     @property
