@@ -136,7 +136,7 @@ class TrpacEstimator:
         return estimate
 
     def _classified(self, picture: NDArray[np.uint8], sensors: Sensors, usable: bool) -> Outcome:
-        """The verdict on a picture; usable readings tell how the car moves."""
+        """The result of a picture; usable readings give the motion of the car."""
         if self._ife is None:
             raise TypeError("A picture came, but the estimator was made without an image estimator.")
         state, acceleration_m_s2 = self._state, self._state.acceleration_m_s2

@@ -96,7 +96,7 @@ class EstimatorConfig:
     left_side : bool
         Whether it is on the left: which wheel's track the camera follows.
     vision : IfeConfig
-        Settings of the image estimator but for what the vehicle and the wheel already say, see `image_settings`.
+        Settings of the image estimator except those that follow from the vehicle and the wheel, see `image_settings`.
     gains, preview
         Settings of the parts.
     tolerance : CarTolerance
@@ -314,7 +314,7 @@ class Rates:
     most_rim_m_s: float
     """How far the rim's speed may be from its filter [m/s]."""
     ahead: float
-    """Share of the way over the step at which the force observer sees what changes evenly over it [-]."""
+    """Share of the step at which the force observer samples an input that changes linearly over it [-]."""
     differentiator_1_s: float
     """Acceleration by the speed's distance from the filter that differentiates it [1/s]."""
 

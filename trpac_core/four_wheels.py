@@ -67,7 +67,7 @@ class FourWheelsConfig:
         Of each wheel; which wheel it is, is set for each.
     axle_deviation : float
         How far friction may differ between the wheels of one side, a wheelbase apart: the standard deviation of the
-        road's change over that way, about 0.05 per root of a metre [-].
+        road's change over that distance, about 0.05 per root of a metre [-].
     """
 
     wheel: EstimatorConfig = field(default_factory=EstimatorConfig)
@@ -147,7 +147,7 @@ def lateral_plausible(sensors: CarSensors) -> bool:
 def car_loads(car: Vehicle, known: CarSetup, sensors: CarSensors) -> CarLoads:
     """Vertical loads.
 
-    A wheel works the load out itself, from the filtered acceleration, unless a sensor or a lateral transfer tells.
+    A wheel computes the load itself, from the filtered acceleration, unless a sensor or a lateral transfer gives it.
     Where the lateral acceleration is no good reading all are NaN, which no wheel takes, used or not.
     """
     loads = known.static_n
@@ -313,7 +313,7 @@ class FourWheels:
         Returns
         -------
         CarEstimate
-            A wheel whose readings are unusable holds its last good estimate, and `problems` says why; the others go on.
+            A wheel whose readings are unusable holds its last good estimate; `problems` has the reason.
 
         Raises
         ------

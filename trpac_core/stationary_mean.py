@@ -1,8 +1,8 @@
 """Means of slip and used friction while a wheel stays at one point of the tyre's curve.
 
 White noise gives one filtered reading the deviation sigma, and a mean over the time t about
-sigma / sqrt(1 + t / (2 tau)), with the filter's constant tau. A mean begins anew wherever slip moves: the curve is bent,
-and a mean along it would lie beside it.
+sigma / sqrt(1 + t / (2 tau)), with the filter's constant tau. A mean restarts when slip moves: the curve is bent, and a
+mean along it would lie beside it.
 """
 
 from __future__ import annotations

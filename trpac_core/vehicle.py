@@ -65,7 +65,7 @@ class CarTolerance:
     ratio : float
         Standard deviation of the rolling radius as a share of it, over load and temperature [-].
     compliance : float
-        Standard deviation of ln(told stiffness / stiffness) of the tyre [-].
+        Standard deviation of ln(described stiffness / stiffness) of the tyre [-].
     """
 
     speed_bias_m_s: float = 0.014

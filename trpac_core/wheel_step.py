@@ -51,7 +51,7 @@ class WheelSetup:
     wheel : Wheel
         Its constants.
     static_load_n, load_by_acceleration : float
-        Load at rest [N], and what it gains per acceleration [kg].
+        Load at rest [N], and its increase per acceleration [kg].
     setback_m : float
         How far it is behind the front axle [m].
     preview : PreviewConfig

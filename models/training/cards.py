@@ -223,7 +223,7 @@ worst bin however few patches it holds.
 - The validation and test stills come from the same kind of web search as the training stills; other cameras are the
   honest guess for a new car. Wet carries over worst: see its recall on other cameras and how few pictures that is.
 - Real wet and snowy dash frames in training come from one car, one clip each, and the val rows of these clips show the
-  same road seconds later. Rendered scores say how well the network knows the renderer, no more.
+  same road seconds later. Rendered scores only show how well the network knows the renderer.
 - Damp, matt asphalt is labelled nowhere in the data. What is found for it is a guess; expect dry.
 - Night roads with reflected lights and wet cobbles are hardly covered. Gravel, soil and painted surfaces are not.
 - A road unlike those in training may look disturbed to the softening, and is less sure than it could be.
@@ -276,7 +276,7 @@ precision.
 
 - Input `image`: uint8 (1, 160, 256, 3), BGR, the whole frame reduced by area averaging; normalisation is in the graph.
 - Outputs `drivable` and `shadow`: float32 (1, 160, 256), probabilities. `shadow` means shadow on the road; off the
-  drivable area it says nothing.
+  drivable area it has no meaning.
 - Output `surface`: float32 (1, 3), logits of dry, wet, snow_ice: of mean and deviation of the encoder's maps on the
   road that was found, and of their mean beside it. The class of the picture as a whole, not of a place in it.
 

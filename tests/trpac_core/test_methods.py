@@ -199,7 +199,7 @@ def test_a_tyre_of_another_curve_is_named_with_its_stiffness():
     (about, text), *others = messages_of(curve=6.5, theta=0.3, most=0.1).items()
     assert not others
     assert about == "Front tyres"
-    learnt = float(text.split("learnt ")[1].split(" kN")[0])
+    learnt = float(text.split("estimated ")[1].split(" kN")[0])
     assert learnt == pytest.approx(6.5 * LOAD_N / 1000.0, rel=0.25)
     assert "told 64 kN (1.27 C_x)" in text
     assert f"at {LOAD_N / 1000.0:.1f} kN load" in text

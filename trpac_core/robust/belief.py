@@ -127,7 +127,7 @@ class Belief:
 
 
 def unread(tyres: Hypotheses, prior: PerCell) -> Belief:
-    """The belief before anything was read, with the cells as likely as the prior says, shape (cells,) [-]."""
+    """The belief before anything was read, with the cells as probable as in the prior, shape (cells,) [-]."""
     like = np.zeros((len(tyres.weight), len(prior)))
     return Belief(
         tyres.weight,

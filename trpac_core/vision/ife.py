@@ -55,7 +55,7 @@ PICTURE_SAY = 0.5
 """Weight of the logits of the whole picture beside those of a patch [-]."""
 
 PATCHES_AHEAD = 6
-"""Patches of a look that is remembered [-]."""
+"""Number of remembered patches per frame [-]."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ class Ife:
         masks : RoadMasks, optional
             Of this picture, where several estimators share it (left and right wheels).
         with_view : bool
-            Whether the result also says where in the picture it looked.
+            Whether the result also has the regions and masks, for drawing.
 
         Returns
         -------
@@ -358,7 +358,7 @@ class Ife:
     ) -> tuple[EvidenceState, GroupResult]:
         """Evidence weights and verdict of one group, Eqs. (7) to (10).
 
-        Patches that were seen before have their say in the weights and the mass, but Eq. (7) combines no more bodies
+        Patches that were seen before count in the weights and the mass, but Eq. (7) combines no more bodies
         of evidence for them: they show the same road again. Where a line parts the group its ground decides, not the
         weights, which know the surface up to the line.
         """

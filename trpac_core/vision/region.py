@@ -118,7 +118,7 @@ class Region:
     boxes : array of int, shape (n, 4)
         Of those left: left, top, right, bottom [px].
     ahead_m : array, shape (n,)
-        Where the middle of each lies on the way [m].
+        Position of the middle of each on the path [m].
     patches : tuple of n arrays of uint8, shape (64, 96, 3)
         BGR.
     probabilities : array, shape (n, 3)

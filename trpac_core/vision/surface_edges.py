@@ -24,7 +24,7 @@ HALF_WIDTH_M, BANDS, COLUMNS_OF_BAND = 1.2, 12, 4
 SIDE_M = 0.15
 """Road before and behind a place that are compared [m]."""
 SLANTS = (-0.08, -0.04, 0.0, 0.04, 0.08)
-"""Angles at which a line may lie across the car's way [rad]."""
+"""Angles at which a line may lie across the path [rad]."""
 DARK = 8.0
 """Grey levels added before the logarithm, so that noise in the dark does not count as a step [8-bit levels]."""
 NOISE, TINT_NOISE = 0.01, 0.004
@@ -54,9 +54,9 @@ def lines_across(
     camera : Camera
         Of the picture's own size.
     reach_m : pair of floats
-        Stretch of the way that is searched [m].
+        Stretch of the path that is searched [m].
     curvature_1_m, wheelbase_m : float
-        Of the way, see `wheel_track` [1/m], [m].
+        Of the path, see `wheel_track` [1/m], [m].
     known_m : array, shape (m,)
         Where lines are expected that were seen before [m].
 
@@ -83,7 +83,7 @@ def plainness(logarithm: NDArray[np.float64], noise: float) -> NDArray[np.float6
     Parameters
     ----------
     logarithm : array, shape (rows, bands)
-        Of the brightness or the tint, rows in the order of the way, `SAMPLE_M` apart [-].
+        Of the brightness or the tint, rows in the order of the path, `SAMPLE_M` apart [-].
     noise : float
         Standard error that is never undercut [-].
 

@@ -42,7 +42,7 @@ class Passed:
     Attributes
     ----------
     end_m : float
-        The place on the way [m].
+        The place on the path [m].
     probabilities : tuple of 3 floats
         Of dry, wet, snow and ice [-].
     """
@@ -77,13 +77,13 @@ def among_neighbours(
     Parameters
     ----------
     ahead_m : array, shape (n,)
-        Where the patches lie along the way [m].
+        Positions of the patches along the path [m].
     probabilities : array, shape (n, 3)
         Calibrated probabilities of each by itself [-].
     lines_m : array, shape (m,)
         Where lines cross the road, ascending: a class is likelier to end there than elsewhere [m].
     passed : Passed, optional
-        The road before the patches, on the same way.
+        The road before the patches, on the same path.
     before : int
         How many of them, the last, were seen in frames before.
 
@@ -128,7 +128,7 @@ def _as_passed(end_m: float, probabilities: NDArray[np.float64]) -> Passed:
 def _told(
     passed: Passed | None, place_m: float, lines_m: NDArray[np.float64] | Sequence[float]
 ) -> NDArray[np.float64]:
-    """What the road passed tells of a place: the less the further on it lies, and the more lines are between [-]."""
+    """Class probabilities at a place by the road passed, which fade with the distance and the lines between [-]."""
     if passed is None:
         return EVEN
     k = len(EVEN)

@@ -33,7 +33,8 @@ class Motion:
     """Motion of the car when the picture is taken.
 
     `yaw_rate_rad_s` (positive to the left) takes the place of the steering angle (front wheels, positive to
-    the left) where it is given and the car is faster than the floor speed. `way_m` is the way of the front wheels since
+    the left) where it is given and the car is faster than the floor speed. `way_m` is the
+    distance driven by the front wheels since
     any start [m]; where it is not given, no road is recognised from frame to frame.
     """
 
@@ -80,7 +81,7 @@ class Ellipses:
     covariance_m2: NDArray[np.float64]
 
     def within(self, from_m: float, to_m: float) -> Ellipses:
-        """The ellipses whose centres lie in [from, to) along the way [m]."""
+        """The ellipses whose centres lie in [from, to) along the path [m]."""
         chosen = (self.distance_m >= from_m) & (self.distance_m < to_m)
         return Ellipses(self.distance_m[chosen], self.centre_m[chosen], self.covariance_m2[chosen])
 
