@@ -33,9 +33,8 @@ class Motion:
     """Motion of the car when the picture is taken.
 
     `yaw_rate_rad_s` (positive to the left) takes the place of the steering angle (front wheels, positive to
-    the left) where it is given and the car is faster than the floor speed. `way_m` is the
-    distance driven by the front wheels since
-    any start [m]; where it is not given, no road is recognised from frame to frame.
+    the left) where it is given and the car is faster than the floor speed. `way_m` is the distance driven by the front
+    wheels since any start [m]; without it no road is recognised from frame to frame.
     """
 
     speed_m_s: float
