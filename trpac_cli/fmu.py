@@ -24,7 +24,7 @@ EXIT_PROBLEMS = 1
 COLOURS = {"ok": "green", "note": "yellow", "problem": "red"}
 
 app = typer.Typer(
-    help="Co-simulation units: build one, examine one, and list what a host needs.", no_args_is_help=True
+    help="Co-simulation units: build one, check one, and list what a host needs.", no_args_is_help=True
 )
 
 
@@ -85,7 +85,7 @@ def doctor(
         bool, typer.Option("--run/--no-run", help="Run the unit's own code; --no-run reads the file only.")
     ] = True,
 ) -> None:
-    """Examine a unit, and say what a host needs to run it.
+    """Check a unit, and list what a host needs to run it.
 
     It checks the archive and its checksums, every file against the hash that the build recorded (a damaged or
     exchanged network is named), modelDescription.xml with fmpy's validation, and the interpreter with its packages.
@@ -136,7 +136,7 @@ def _json(file: Path, examined: Examination, needs: tuple[HostNeeds, ...]) -> di
 
 def _show(console: Console, file: Path, examined: Examination, needs: tuple[HostNeeds, ...]) -> None:
     findings = Table(title=escape(f"{examined.unit} ({file})"), title_justify="left")
-    for heading in ("looked at", "", "found"):
+    for heading in ("check", "", "result"):
         findings.add_column(heading, overflow="fold")
     for finding in examined.findings:
         state = finding.state.value
