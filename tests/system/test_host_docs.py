@@ -27,20 +27,30 @@ ABORTED_AFTER_THE_RESULTS = 128 + 6
 """The interpreter's shutdown with the wrapper loaded sometimes aborts: "Limits" in docs/reference/unit.md."""
 
 
+TITLE = re.compile(r'title="([^"]*)"')
+OUTPUT, BY_HAND = "output", "by hand: "
+"""Titles of blocks that are no files: the output of the command above; what is not run, and why."""
+
+
 class Block(NamedTuple):
-    """One code block: its language, the file that it is to be saved as, its text."""
+    """One code block: its language, its title, its text."""
 
     language: str
-    file: str
+    title: str
     text: str
+
+    @property
+    def file(self) -> str:
+        """Name of the file that the block is saved as; empty: it is none."""
+        return "" if self.title == OUTPUT or self.title.startswith(BY_HAND) else self.title
 
 
 def blocks(page: Path) -> list[Block]:
     """Code blocks of a page, in order."""
     found = []
     for info, text in FENCE.findall(page.read_text(encoding="utf-8")):
-        language, _, file = info.partition(" ")
-        found.append(Block(language, file.strip(), text))
+        title = TITLE.search(info)
+        found.append(Block(info.split(" ")[0], title[1] if title else "", text))
     return found
 
 
@@ -49,9 +59,9 @@ def runs(page: Path) -> list[tuple[str, str | None]]:
     listed = blocks(page)
     following = [*listed[1:], Block("", "", "")]
     return [
-        (block.text, after.text if after.language == "text" else None)
+        (block.text, after.text if after.title == OUTPUT else None)
         for block, after in zip(listed, following, strict=True)
-        if block.language == "bash"
+        if block.language == "bash" and not block.title
     ]
 
 
@@ -61,26 +71,25 @@ def runs(page: Path) -> list[tuple[str, str | None]]:
     [
         ("fmpy.md", (), None),
         ("c_host.md", (), "cc"),
-        ("simulink.md", (), None),
+        ("native.md", (), "cc"),
+        ("simulink.md", (), "cc"),
         ("libcosim_ecos.md", ("libcosimpy", "ecospy"), None),
     ],
 )
 def test_page_does_what_it_says(
-    unit_file: Path, tmp_path: Path, page: str, packages: tuple[str, ...], program: str | None
+    tmp_path: Path, page: str, packages: tuple[str, ...], program: str | None
 ) -> None:
     for package in packages:
         need_client(package)
     if program is not None and (shutil.which(program) is None or not sys.platform.startswith("linux")):
         pytest.skip(f"{page} needs {program} on Linux")
-    (tmp_path / "dist").mkdir()
-    (tmp_path / "dist" / unit_file.name).symlink_to(unit_file)
-    (tmp_path / "build_fmu.py").symlink_to(ROOT / "build_fmu.py")
     for block in blocks(PAGES / page):
         if block.file:
             (tmp_path / block.file).write_text(block.text, encoding="utf-8")
     environment = {
         **os.environ,
         "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]),
+        "PYTHONPATH": str(ROOT),
     }
     commands = runs(PAGES / page)
     assert commands, f"{page} shows no command to run"
@@ -124,9 +133,7 @@ def test_relative_links_lead_somewhere(document: Path) -> None:
 def test_index_names_every_page() -> None:
     index = (PAGES / "index.md").read_text(encoding="utf-8")
     missing = [
-        page.name
-        for page in PAGES.glob("*.md")
-        if page.name != "index.md" and f"]({page.name})" not in index
+        page.name for page in PAGES.glob("*.md") if page.name != "index.md" and f"]({page.name})" not in index
     ]
     assert not missing
 
