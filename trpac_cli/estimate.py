@@ -53,7 +53,8 @@ def estimate(
     a mapping file; trpac log check proposes one.
 
     The friction can be found only where a tyre slips enough: brake or
-    accelerate up to a slip of 0.02 or more. Elsewhere the interval is wide.
+    accelerate up to a slip of 0.02 or more. Elsewhere TRPAC_std and the
+    interval TRPAC_low to TRPAC_high are wide.
     The tyre stiffness and the rolling radius in the car file decide the
     result: a radius error of 1 % is a slip error of 0.01.
 
