@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from report_page import Page, require_report
+from report_page import require_report
 
 from scenarios.html_page import number, page, percent
 from scenarios.plot_style import (
@@ -239,13 +239,10 @@ def test_templates_hold_no_style_of_their_own():
     templates = [p for p in root.rglob("*.html.jinja") if not {".venv", "build"} & set(p.parts)]
     reports = [p for p in templates if p.name == "report.html.jinja"]
     assert len(reports) == 4
-    assert sorted(p.name for p in templates if p not in reports) == [
-        "report_base.html.jinja",
-        "report_parts.html.jinja",
-    ]
-    for path in reports:
+    for path in templates:
         text = path.read_text()
-        assert text.startswith('{% extends "report_base.html.jinja" %}'), path
-        assert "<style" not in text
-        assert "<table" not in text
-        assert Page(text.partition("{% block body %}")[0])
+        if path in reports:
+            assert text.startswith('{% extends "report_base.html.jinja" %}'), path
+        if path.name not in ("report_base.html.jinja", "report_parts.html.jinja"):
+            for tag in ("<style", "<table", "<img", "<html"):
+                assert tag not in text, path
