@@ -203,10 +203,15 @@ def put_together(
         model = Simulation(car)
         named = [paired_with(s, r, model, by) for s, r in zip(named, references, strict=True)]
     *fitted, held = (with_turns_told(source, car) for source in named)
-    if any(s.log.sha256 == held.log.sha256 for s in fitted):
-        told = "is a fit log, too: what is said of the hold-out holds for what the parameters were fitted to."
+    if any(_share_rows(s.log, held.log) for s in fitted):
+        told = "is a fit log, too: its gap is not that of an independent drive, since parameters were fitted to it."
         held = replace(held, log=held.log.warned(told))
     return Sources(car, vehicle_path, tuple(fitted), held)
+
+
+def _share_rows(a: Log, b: Log) -> bool:
+    """Whether two logs are windows of one file that overlap in time."""
+    return a.sha256 == b.sha256 and a.time_s[0] <= b.time_s[-1] and b.time_s[0] <= a.time_s[-1]
 
 
 def paired_with(source: Source, reference: Source, model: Simulation, by: By = "time") -> Source:

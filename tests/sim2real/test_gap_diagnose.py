@@ -16,12 +16,14 @@ from gap_files import write_log, write_road
 import sim2real
 from scenarios.effects import EFFECTS, FORMS
 from scenarios.errors import ScenarioError
+from scenarios.files import load_road, load_vehicle
 from sim2real.demo import VEHICLE
 from sim2real.diagnose import diagnose, diagnose_files, shrink_on
+from sim2real.logs import read_log
 from sim2real.observing.drive import CHANNELS, RECOVERY_S, WHEEL, backward, make_drive
 from sim2real.reporting.report import jsonable
 from sim2real.result import Diagnosis, Verdict
-from sim2real.sources import read_sources, split
+from sim2real.sources import make_source, put_together, read_sources, split
 from trpac_core.vehicle import WHEELS
 
 PAYLOAD = {"mass_offset": {"mass_kg": 180.0}}
@@ -451,6 +453,24 @@ def test_a_hold_out_that_is_a_fit_log_is_said(folder):
     assert any("is a fit log, too" in text for text in same.holdout.log.warnings)
     other = read_sources(folder / "vehicle.yaml", folder / "dry.yaml", files[:1], files[1])
     assert not other.holdout.log.warnings
+
+
+def test_windows_of_one_log_may_be_fitted_to_and_held_out(folder):
+    """Regression: every window of the hold-out's file was called a fit log."""
+    vehicle, road = load_vehicle(folder / "vehicle.yaml"), load_road(folder / "dry.yaml")
+    log = read_log(folder / "fit_1.csv")
+    begin, end = log.time_s[[0, -1]]
+    middle = 0.5 * (begin + end)
+    early, late, across = log.window(begin, middle), log.window(middle, end), log.window(begin + 1.0, end)
+
+    def warnings(fit, holdout):
+        return put_together(
+            vehicle, None, [make_source(part, road) for part in (fit, holdout)]
+        ).holdout.log.warnings
+
+    assert not warnings(early, late)
+    assert not warnings(late, early)
+    assert any("is a fit log, too" in text for text in warnings(across, late))
 
 
 def test_wheels_that_turn_back_are_left_out_and_said(folder, tmp_path):
