@@ -78,7 +78,7 @@ def with_reading(
 def least_slip(mean: StationaryMean, noise: float, noise_s: float) -> float:
     """The slip that the wheel has with significance: that of the mean less what noise and movement may add to it [-].
 
-    On grippy roads force and slip lie on the curve's elastic part, where noise alone decides on which side of its
+    On grippy roads force and slip lie on the curve's linear part, where noise alone decides on which side of its
     end: half of all samples then seem to slide, and to have a theta of little more than the friction they use.
 
     Parameters

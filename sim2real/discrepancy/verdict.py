@@ -56,7 +56,7 @@ def beside_another_build(
     fit_to, holdout : Evidence
         The logs.
     baseline : Evidence, optional
-        Logs of the same car without the suspected fault.
+        Logs of the same car without the fault.
     jobs, progress : int, callable
         Threads; told the stage and how much of how much is done.
     """

@@ -304,12 +304,14 @@ def _judgement(own: Sequence[Mask], step_s: float) -> str:
     """Over how long the runs were judged, and what that means where one has nothing to be judged by."""
     lengths_s = [np.count_nonzero(mask) * step_s for mask in own]
     text = (
-        f"Judged over {lengths_s[0]:.1f} s before and {lengths_s[1]:.1f} s after, where the front left tyre shows "
-        "the road or the estimator takes it to."
+        f"Evaluated over {lengths_s[0]:.1f} s before and {lengths_s[1]:.1f} s after, in which the excitation of "
+        "the front left tyre suffices, by the reference or by the estimator."
     )
     for which, length_s in zip(("Before", "After"), lengths_s, strict=True):
         if length_s == 0.0:
-            text += f" {which}, it never does: its figure is what it goes on holding over the other's time."
+            text += (
+                f" {which}, it never suffices: that error is the one of the value that the estimator holds."
+            )
     return text
 
 
@@ -323,15 +325,15 @@ def _against(model: Simulation, mu_reference: Array | None) -> str:
 def _placed(simulation: Simulation, added: Sequence[Effect], drive: Drive) -> str:
     """A sentence per effect on its place in the estimator."""
     if not added:
-        return "Nothing was found to put into the estimator."
+        return "No effect was found that could be put into the estimator."
     parameters, _ = simulation.setup(drive.road)
     out = []
     for effect in added:
         found = places(effect, parameters)
         if found:
-            out.append(f"{effect.id} goes into {' and '.join(found)} of the estimator.")
+            out.append(f"{effect.id} changes {' and '.join(found)} of the estimator.")
         elif type(effect).road is not Effect.road:
-            out.append(f"{effect.id} changes the road, which the estimator finds out by itself.")
+            out.append(f"{effect.id} changes the road, which the estimator estimates itself.")
         else:
-            out.append(f"{effect.id} has no place in the estimator and leaves its estimate as it is.")
+            out.append(f"{effect.id} has no parameter in the estimator; its estimate does not change.")
     return " ".join(out)

@@ -387,7 +387,9 @@ def test_what_the_logger_wrote_before_the_sensors_woke_is_left_out_and_said(fold
         folder / "vehicle.yaml", folder / "dry.yaml", [f"{tmp_path}/waking.csv"], f"{folder}/holdout.csv"
     )
     assert found.fit[0].drive.time_s[0] == pytest.approx(1.0)
-    assert "the first 1 s are left out: nothing tells yet how fast the car is." in found.fit[0].log.warnings
+    assert (
+        "the first 1 s are left out: the speed of the car is not measured there." in found.fit[0].log.warnings
+    )
     assert not any("left out" in text for text in found.holdout.log.warnings)
 
 
@@ -418,7 +420,7 @@ def test_the_estimate_is_held_to_the_reference_of_its_own_rows_where_sensors_wak
 @pytest.mark.parametrize(
     ("speed_m_s", "known", "said"),
     [
-        (13.0, 200, r"in its last 1\.59 s alone; expected at least 2 s"),
+        (13.0, 200, r"in its last 1\.59 s only; expected at least 2 s"),
         (0.0, 200, "never moves forward on all wheels"),
     ],
 )

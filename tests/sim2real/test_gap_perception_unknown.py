@@ -103,7 +103,7 @@ def test_rounded_or_saturated_confidence_is_no_repeated_result(digits):
         1,
         [
             ({"offset": (0.2, 0.0, 0.0)}, "class_friction_offset", "explains mu_reference"),
-            ({"blur_s": 0.03}, "motion_blur", "how the confidence goes with speed"),
+            ({"blur_s": 0.03}, "motion_blur", "how the confidence depends on speed"),
             ({"dimmed": 0.4}, "exposure_shift", "how low the confidence is"),
         ],
     ),

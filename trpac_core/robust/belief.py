@@ -35,7 +35,7 @@ SLIDING_SHARE = 0.2
 RELAXATION_M = 0.3
 """Way over which a tyre's force follows its slip: car tyres have 0.1 to 0.6 m (Pacejka 2012, ch. 7) [m]."""
 DRIFT = 0.02
-"""How far a tyre's slip offset and softness wander per root of a second, over their standard deviations [1/sqrt(s)]."""
+"""Random walk of a tyre's slip offset and softness per root of a second, over their standard deviations [1/sqrt(s)]."""
 SOFTER = 0.03
 """Standard deviation that the softness of a tyre of unknown curve gains where the road changes [-]."""
 FORGETTING_1_S = 0.1
