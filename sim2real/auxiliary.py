@@ -87,8 +87,8 @@ def camera_verdict(
     """The camera chain's auxiliary verdict; with vehicle and road also the next manoeuvre."""
     alone = {c.effects[0]: c for c in found.candidates if len(c.effects) == 1}
     told: dict[str, CameraCandidate] = {}
-    blamed = [c for c in found.candidates if set(c.effects) == set(found.causes)]
-    for candidate in (*blamed, *alone.values(), *found.candidates):
+    named = [c for c in found.candidates if set(c.effects) == set(found.causes)]
+    for candidate in (*named, *alone.values(), *found.candidates):
         for effect in candidate.effects:
             told.setdefault(effect, candidate)
     share = _shares(found)
@@ -149,16 +149,16 @@ def _next(found: PerceptionFinding, vehicle: VehicleFile, road: RoadFile) -> Nex
 
 
 def _in_numbers(found: PerceptionFinding) -> str:
-    """What the causes do to the camera's gap, and at which values; empty where nothing is blamed."""
-    blamed = next((c for c in found.candidates if set(c.effects) == set(found.causes)), None)
-    if blamed is None:
+    """What the causes do to the camera's gap, and at which values; empty where nothing is named."""
+    named = next((c for c in found.candidates if set(c.effects) == set(found.causes)), None)
+    if named is None:
         return ""
     values = ", ".join(
         f"{name} {value.value:.3g} {value.unit}".removesuffix(" -")
-        for effect in blamed.effects
-        for name, value in _own(effect, blamed).items()
+        for effect in named.effects
+        for name, value in _own(effect, named).items()
     )
-    if not np.isfinite(blamed.after.total):
+    if not np.isfinite(named.after.total):
         return f"with {values}; the hold-out does not show by how much the camera's gap decreases."
     return (
         f"with {values} the camera's gap decreases from {found.before.total:.1f} to {found.after.total:.1f} times "

@@ -56,8 +56,8 @@ def merge(main: Diagnosis, aux: AuxiliaryVerdict) -> Diagnosis:
     misplaced = aux.unexplained is not None and aux.unexplained.signal == PLACE
     sentence = main.sentence
     if not aux_no_gap:
-        blamed = "" if aux.unexplained else " and ".join(aux.named)
-        told = f"{blamed or 'Unknown cause'}: {aux.sentence}".strip(": ")
+        named = "" if aux.unexplained else " and ".join(aux.named)
+        told = f"{named or 'Unknown cause'}: {aux.sentence}".strip(": ")
         beside = f"{main.sentence} In addition: {told}"
         if misplaced:
             beside = (

@@ -95,7 +95,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Cause:
-    """One candidate (an effect, or the pair of a compound) and what speaks for it.
+    """One candidate (an effect, or the pair of a compound) with its evidence.
 
     Attributes
     ----------
@@ -328,7 +328,7 @@ class Diagnosis:
     """None where there is no gap to share out."""
     trpac: RmsError | None = None
     own_model: OwnFinding | None = None
-    """None where the nominal model stands for itself."""
+    """None without a model of the user."""
     rating: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
     """ISO/TS 18571 rating per signal, before and after; None where it is not defined."""
     traces: tuple[Trace, ...] = ()

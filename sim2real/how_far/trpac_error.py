@@ -154,10 +154,10 @@ def trpac_error(
             f"mu_reference has shape {mu_reference.shape}; expected {drive.time_s.shape}, "
             f"a value per row of {drive.name}."
         )
-    simulation, mended = Simulation(vehicle), Simulation(vehicle, added)
-    model = mended.predict(drive)
-    noise_m_s = _sliding_speed_noise(mended, drive, model)
-    old, new = _inputs(simulation, drive), _inputs(mended, drive)
+    simulation, improved = Simulation(vehicle), Simulation(vehicle, added)
+    model = improved.predict(drive)
+    noise_m_s = _sliding_speed_noise(improved, drive, model)
+    old, new = _inputs(simulation, drive), _inputs(improved, drive)
     first = _run(old, drive, noise_m_s)
     second = first if new.same_as(old) else _run(new, drive, noise_m_s)
     truth = _truth(model, mu_reference)
@@ -171,7 +171,7 @@ def trpac_error(
         for run, mask in zip((first, second), rows, strict=True)
     )
     said = (_placed(simulation, added, drive), _judgement(own, drive.step_s))
-    return RmsError(before, after, _against(mended, mu_reference), " ".join(said))
+    return RmsError(before, after, _against(improved, mu_reference), " ".join(said))
 
 
 def places(effect: Effect, parameters: DynamicsParameters) -> tuple[str, ...]:
@@ -237,7 +237,7 @@ def _sliding_speed_noise(model: Simulation, drive: Drive, prediction: Prediction
 
 
 def _run(inputs: Inputs, drive: Drive, sliding_speed_noise_m_s: float) -> Run:
-    # What a model is worth shows where the estimator does not mend it by itself.
+    # What a model is worth shows where the estimator does not correct it by itself.
     config = EstimatorConfig(
         vehicle=inputs.vehicle,
         tolerance=EXACT_CAR,

@@ -31,7 +31,7 @@ COUNTER = "wheel_speed_quantisation"
 FINALISTS = 6
 """Effects that are fitted to all fit logs with full care, after a first round on one log."""
 NEAR = 0.2
-"""Share of the way from an effect's absence to its nearest start that a fit begins at, too [-]."""
+"""Share of the distance from an effect's absence to its nearest start, at which a fit begins too [-]."""
 FIRST_ROUND_STEPS = 4
 """Steps of the first round's fits."""
 LARGER_LOSS = 3.0

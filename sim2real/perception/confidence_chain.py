@@ -1,4 +1,4 @@
-"""The confidence's account: blur, exposure or both against the simulation as it is, with what speaks for them."""
+"""The confidence's account: blur, exposure or both against the simulation as it is, with the evidence."""
 
 from __future__ import annotations
 

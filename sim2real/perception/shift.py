@@ -258,8 +258,8 @@ def _another_law(best: Account, choice: tuple[str, ...]) -> Oddity:
     """What a shift is that goes with speed in a way that no effect of the library has."""
     laws = {"camera_latency": "is proportional to speed", "camera_pitch": "does not depend on speed"}
     law = " and partly ".join(laws[effect] for effect in choice)
-    blamed = " and ".join(best.effects) or "no effect of the library"
-    told = f"The changes of class are shifted by a distance that {law}, which {blamed} does not explain."
+    named = " and ".join(best.effects) or "no effect of the library"
+    told = f"The changes of class are shifted by a distance that {law}, which {named} does not explain."
     late = "camera_latency" in choice
     return Oddity(
         SIGNAL,

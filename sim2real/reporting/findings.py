@@ -69,7 +69,7 @@ class Findings:
     """Whether that is the whole gap."""
 
     def added(self) -> tuple[Effect, ...]:
-        """What the verdict blames, to be added to the model."""
+        """The effects that the verdict names, to be added to the model."""
         entry = self.decision.winner
         if entry.fit is None or self.decision.verdict is Verdict.UNKNOWN:
             return ()
@@ -251,7 +251,7 @@ def _stands(found: Findings) -> Entry:
 
 
 def _missing(found: Findings, held: Evidence, before: Sequence[Array]) -> dict[str, Sequence[Array]]:
-    """Subsystem to what the verdict leaves without its effects there; empty where it blames nothing."""
+    """Residuals per subsystem without the named effects in it; empty if no effect is named."""
     parts = dict.fromkeys(EFFECTS[effect.id].subsystem for effect in found.added())
     if len(parts) == 1:
         return dict.fromkeys(parts, before)
