@@ -63,17 +63,11 @@ parameters (neutral 0):
 
 def page() -> str:
     """The page as Markdown text."""
-    parts = [HEAD, "| effect | part of the car | parameters |\n|---|---|---|"]
-    parts[-1] += "".join(f"\n{_table_row(effect)}" for effect in EFFECTS.values())
+    parts = [HEAD]
     for stage, meaning in STAGES.items():
         parts.append(f"## {stage.capitalize()}: {meaning}")
         parts += [_section(effect) for effect in EFFECTS.values() if effect.stage == stage]
     return "\n\n".join(part.strip() for part in parts) + "\n"
-
-
-def _table_row(effect: type[Effect]) -> str:
-    names = ", ".join(f"`{p.name}`" for p in effect.parameters())
-    return f"| [`{effect.id}`](#{effect.id}) | {effect.subsystem.replace('_', ' ')} | {names} |"
 
 
 def _section(effect: type[Effect]) -> str:
@@ -85,11 +79,15 @@ def _section(effect: type[Effect]) -> str:
 - Equation: `{effect.equation}`
 - Excitation: {effect.excited_by}
 - Confounders: {", ".join(f"`{key}`" for key in effect.confounders)}
-- Source: {effect.source}
-
+{_source(effect)}
 | parameter | unit | meaning | neutral | bounds | start values |
 |---|---|---|---|---|---|
 {rows}{"".join(map(_form, FORMS[effect.id][1:]))}"""
+
+
+def _source(effect: type[Effect]) -> str:
+    """A line with the source; empty where the equation is a definition."""
+    return "" if effect.source == "definition" else f"- Source: {effect.source}\n"
 
 
 def _form(other: type[Effect]) -> str:
