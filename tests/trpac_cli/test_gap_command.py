@@ -307,7 +307,7 @@ class TestDemo:
             ("tyre_relaxation", "identified", "[green]right"),
             ("torque_lag", "identified", "[red]not right"),
             ("torque_gain", "ambiguous", "cannot separate"),
-            ("tyre_relaxation", "unknown", "not[/red] try it"),
+            ("tyre_relaxation", "unknown", "not[/red] fit it"),
             ("mass_offset", "partial", "[green]right"),
             ("torque_lag", "no_gap", "says 'no_gap' and ranks the hidden effect 1 of 3"),
         ],
