@@ -25,7 +25,8 @@ def build_fmu(
     unit : str
         TrpacEstimator, TrpacEstimator4W, ReferencePlant or TorquePulses.
     kind : str
-        python, or native: TrpacEstimator or TrpacEstimator4W in C, whose host needs no Python (docs/guide/unit/native.md).
+        python, or native: TrpacEstimator or TrpacEstimator4W in C, whose host needs no Python; building one needs a C
+        compiler (docs/guide/unit/native.md).
     fmi : int
         Version of FMI: 2 for 2.0; of a native unit also 3 for 3.0.
     flat : bool

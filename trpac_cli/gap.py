@@ -53,12 +53,13 @@ def diagnose(
     fit: Annotated[
         list[str],
         typer.Option(
-            help="Log to fit to (table, MDF, MAT-file, bus log), LOG or LOG@ROAD.yaml; may be repeated."
+            help="Log to fit to (table, MDF, MAT-file, bus log): LOG, LOG@ROAD.yaml, LOG@FROM:TO in seconds, or "
+            "LOG@ROAD.yaml@FROM:TO; may be repeated."
         ),
     ],
     holdout: Annotated[
         str,
-        typer.Option(help="Log on which the gap is measured; nothing is fitted to it. LOG or LOG@ROAD.yaml."),
+        typer.Option(help="Log on which the gap is measured; nothing is fitted to it. As --fit."),
     ],
     out: Annotated[Path, typer.Option(help="Folder for diagnosis.json and report.html.")],
     road: Annotated[
@@ -120,6 +121,9 @@ def diagnose(
     Example: trpac gap diagnose --vehicle car.yaml --road track.yaml
     --fit monday.csv --fit tuesday.mf4 --holdout friday.csv@wet_track.yaml
     --map mapping.yaml --out out/gap
+
+    With one log only, fit to some windows of it and hold another one out:
+    --fit drive.csv@0:6 --fit drive.csv@10: --holdout drive.csv@6:10
 
     A mapping file translates other column names and units: schema: 1, and
     under columns: lines such as vehicle_speed_m_s: {column: VehSpd, unit: km/h}.

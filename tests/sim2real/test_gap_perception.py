@@ -125,7 +125,8 @@ def test_an_unknown_finding_does_not_believe_in_its_best_effect():
 def test_a_blamed_effect_is_told_with_its_values_and_what_it_does():
     told = camera_verdict(diagnose(Camera(delay_s=0.25), speeds=SLOW_AND_FAST)).sentence
     assert re.match(
-        r"with delay_s 0\.2\d+ s the camera's gap decreases from \d+\.\d to 1\.\d times the noise floor\.", told
+        r"with delay_s 0\.2\d+ s the camera's gap decreases from \d+\.\d to 1\.\d times the noise floor\.",
+        told,
     )
     assert camera_verdict(diagnose(Camera(), speeds=SLOW_AND_FAST)).sentence == ""
 
