@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-import tempfile
+from functools import partial
 from pathlib import Path
 
 from fmu_src.build_command import EPILOG, Product, run_build
-from fmu_src.kinds import KINDS, NATIVE, PYTHON, known_units
-from fmu_src.kinds import build as build_unit
+from fmu_src.kinds import KINDS, PYTHON
 
 RUN_S = 0.5
 """How long the package is run after it is built [s]."""
@@ -36,20 +35,11 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
 
     def load() -> Product:
-        from fmu_src.ssp import SYSTEMS, build_package
+        from fmu_src.ssp import SYSTEMS
+        from fmu_src.ssp_build import build_system
         from fmu_src.ssp_client import problems, simulate
 
-        of_kind = known_units(options.kind)
-
-        def build(name: str) -> Path:
-            wiring = SYSTEMS[name]
-            with tempfile.TemporaryDirectory(prefix="trpac_ssp_") as scratch:
-                units = {
-                    unit: build_unit(unit, Path(scratch), kind=options.kind if unit in of_kind else PYTHON)
-                    for unit in wiring.elements.values()
-                }
-                ending = "_native" if options.kind == NATIVE else ""
-                return build_package(wiring, units, options.out / f"{wiring.name}{ending}.ssp")
+        build = partial(build_system, folder=options.out, kind=options.kind)
 
         def run(path: Path) -> str:
             simulate(path, RUN_S)
