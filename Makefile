@@ -8,7 +8,7 @@ BLIND_SEED ?= 1
 # The tests start hundreds of processes; without byte code each would compile every library anew.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo test test-all check style types compiled collected format lock audit wheel wheel-test clean blind bench
+.PHONY: help demo test test-all check style types compiled collected site format lock audit dist wheel-test clean blind bench
 
 help:            ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -35,7 +35,7 @@ test:            ## lint, types and the test suite
 test-all:        ## the same with the tests that take long (twice the time)
 test test-all: export OPENBLAS_NUM_THREADS = 1
 test test-all: $(READY) style
-	@$(MAKE) --no-print-directory -j 3 types compiled collected
+	@$(MAKE) --no-print-directory -j 3 types compiled collected site
 	$(BIN)/python -m pytest -n 3 --dist loadfile --hypothesis-seed 0 $(CHOSEN)
 
 check: style types  ## lint and types
@@ -54,6 +54,10 @@ compiled: $(READY)
 collected: $(READY)
 	@$(BIN)/python -m pytest -q --collect-only >/dev/null || true  # else each worker would rewrite all assertions; what is wrong the suite tells
 
+site: $(READY)   ## the site into out/site, its notebooks run, its links checked
+	@echo "building the site"
+	@mkdir -p out; NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict >out/site.log 2>&1 || { cat out/site.log; exit 1; }
+
 format: $(READY) ## rewrite the sources in the house format
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
@@ -66,12 +70,12 @@ lock: $(READY)   ## resolve the dependencies anew (needs uv on PATH)
 # The wheel in a fresh environment of each of these, in an empty folder; CI does it for one.
 PYTHONS ?= python3.11 python3.12 python3.13
 
-wheel: $(READY)  ## build the wheel into dist
-	rm -rf build dist/*.whl
-	$(BIN)/python -m build --wheel --outdir dist . >/dev/null
+dist: $(READY)   ## the source archive, and from it the wheel, into dist
+	rm -rf build dist/*.whl dist/*.tar.gz
+	$(BIN)/python -m build --outdir dist . >/dev/null
 	rm -rf build
 
-wheel-test: wheel ## install the wheel into fresh environments, run the README's Python and the commands there
+wheel-test: dist ## install the wheel into fresh environments, run the README's Python and the commands there
 	@set -e; for python in $(PYTHONS); do \
 	  place=$$(mktemp -d); echo "$$python in $$place"; \
 	  $$python -m venv $$place/env; \

@@ -67,7 +67,8 @@ def diagnose_files(
     vehicle, road : Path
         vehicle.yaml, and the road of the logs that name none.
     fit, holdout : sequence of str, str
-        Logs that parameters are fitted to, and the one that the gap is measured on; `log.csv` or `log.csv@road.yaml`.
+        Logs that parameters are fitted to, and the one that the gap is measured on; `log.csv`,
+        `log.csv@road.yaml`, or with a window in seconds, `log.csv@3:5.2`.
     mapping : Path, optional
         How the logs' columns become the contract's.
     dbc : sequence of Path

@@ -322,7 +322,7 @@ class Diagnosis:
     unexplained: Unexplained | None = None
     """What is left where no effect explains the gap (`unknown`), or beside the effect (`partial`)."""
     build: dict[str, float] = field(default_factory=dict)
-    """How the car's build differs from the simulated one beside the effect: change to its size, see docs/guide/gap.md."""
+    """How the car's build differs from the simulated one beside the effect: change to its size."""
     budget: Budget | None = None
     """None where there is no gap to share out."""
     trpac: RmsError | None = None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -43,6 +45,26 @@ LEAST_UNCOVERED_S = 0.1
 """From so much time without a reference on it is told [s]."""
 YAML = (".yaml", ".yml")
 """How the name of a log's own road ends."""
+WINDOW = re.compile(r"@(\d*\.?\d*):(\d*\.?\d*)$")
+"""The part of a log that is meant, from one time of its clock up to another [s]."""
+EVER = (-math.inf, math.inf)
+
+
+@dataclass(frozen=True)
+class Given:
+    """A log as a user names it: its file, its road, and from when to when it counts, by its own clock [s]."""
+
+    log: Path
+    road: Path
+    from_s: float = -math.inf
+    to_s: float = math.inf
+
+    def cut(self, log: Log) -> Log:
+        """The part of the log that is meant, named by its times; raises LogError where it is shorter than two rows."""
+        if (self.from_s, self.to_s) == EVER:
+            return log
+        part = log.window(self.from_s, self.to_s)
+        return replace(part, name=f"{log.name} from {part.time_s[0]:.4g} to {part.time_s[-1]:.4g} s")
 
 
 @dataclass(frozen=True)
@@ -138,7 +160,7 @@ def read_sources(
     vehicle, road : Path
         vehicle.yaml, and the road of the logs that name none.
     fit, holdout : sequence of str, str
-        Logs, each `log.csv` or `log.csv@road.yaml`.
+        Logs, each `log.csv`, `log.csv@road.yaml`, or with a window in seconds, `log.csv@3:5.2`.
     mapping : Path, optional
         How the logs' columns become the contract's.
     pairing : Pairing, optional
@@ -203,10 +225,15 @@ def put_together(
         model = Simulation(car)
         named = [paired_with(s, r, model, by) for s, r in zip(named, references, strict=True)]
     *fitted, held = (with_turns_told(source, car) for source in named)
-    if any(s.log.sha256 == held.log.sha256 for s in fitted):
+    if any(s.log.sha256 == held.log.sha256 and _overlap(s.log, held.log) for s in fitted):
         told = "is a fit log, too: what is said of the hold-out holds for what the parameters were fitted to."
         held = replace(held, log=held.log.warned(told))
     return Sources(car, vehicle_path, tuple(fitted), held)
+
+
+def _overlap(one: Log, other: Log) -> bool:
+    """Whether two parts of a log have time in common."""
+    return max(one.time_s[0], other.time_s[0]) <= min(one.time_s[-1], other.time_s[-1])
 
 
 def paired_with(source: Source, reference: Source, model: Simulation, by: By = "time") -> Source:
@@ -278,21 +305,21 @@ def told_apart(sources: Sequence[Source]) -> list[Source]:
 def read_source(
     text: str, road: Path | None, columns: Mapping | None = None, dbc: Sequence[Path] = ()
 ) -> Source:
-    """Read one log, `log.csv` or `log.csv@road.yaml`, and its road; raises ScenarioError with all problems of both."""
-    log_path, road_path = split(text, road)
+    """Read one log, `log.csv@road.yaml@3:5.2`, and its road; raises ScenarioError with all problems of both."""
+    given = split(text, road)
     problems: list[str] = []
     course, log = None, None
     try:
-        course = load_road(road_path)
+        course = load_road(given.road)
     except ScenarioError as error:
         problems.append(str(error))
     try:
-        log = read_log(log_path, columns, dbc)
+        log = given.cut(read_log(given.log, columns, dbc))
     except ScenarioError as error:
         problems.append(str(error))
     if course is None or log is None:
         raise ScenarioError("\n".join(problems))
-    return make_source(log, course, road_path)
+    return make_source(log, course, given.road)
 
 
 def make_source(log: Log, road: RoadFile, road_path: Path | None = None) -> Source:
@@ -351,15 +378,29 @@ def drive_of(log: Log, road: RoadFile, grid: tuple[Array, dict[str, Array]]) -> 
 
 def _road_of(text: str, road: Path | None) -> Path | None:
     """The road that a log's reference is on where it names none: the log's."""
-    return split(text, road)[1] if road is not None or "@" in text else None
+    return split(text, road).road if road is not None or "@" in text else None
 
 
-def split(text: str, road: Path | None) -> tuple[Path, Path]:
-    """Log and road of `log.csv@road.yaml`, or of a log alone with the common road; either path may hold an @."""
+def split(text: str, road: Path | None) -> Given:
+    """Log, road and window of `log.csv@road.yaml@3:5.2`; road and window may be left out, either path may hold an @."""
+    whole = text
+    window = WINDOW.search(text)
+    if window is not None and not Path(text).is_file():
+        text = text[: window.start()]
+        from_s, to_s = (
+            float(end) if end else default for end, default in zip(window.groups(), EVER, strict=True)
+        )
+        if not from_s < to_s:
+            raise ScenarioError(
+                f"{whole}: the window ends before it begins; expected LOG@FROM:TO in seconds."
+            )
+        bounds = (from_s, to_s)
+    else:
+        bounds = EVER
     marks = [i for i, letter in enumerate(text) if letter == "@"] if text.lower().endswith(YAML) else []
     if marks:
         mark = next((i for i in marks if Path(text[:i]).is_file()), marks[-1])
-        return Path(text[:mark]), Path(text[mark + 1 :])
+        return Given(Path(text[:mark]), Path(text[mark + 1 :]), *bounds)
     if road is None:
         raise ScenarioError(f"{text}: names no road; expected LOG@ROAD.yaml, or --road for all logs.")
-    return Path(text), road
+    return Given(Path(text), road, *bounds)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from sim2real.logs import Log
     from trpac import effects
     from trpac.estimation import Estimates, estimate
+    from trpac.example_files import example
     from trpac.extras import MissingExtraError
     from trpac.files import list_effects, list_roads, list_scenarios, list_vehicles, read_log
     from trpac.gap import Diagnosis, diagnose
@@ -34,6 +35,7 @@ _MODULES = {
     "scenarios.wheel_estimator": ("Estimate", "Estimator"),
     "sim2real.logs": ("Log",),
     "trpac.estimation": ("Estimates", "estimate"),
+    "trpac.example_files": ("example",),
     "trpac.extras": ("MissingExtraError",),
     "trpac.files": ("list_effects", "list_roads", "list_scenarios", "list_vehicles", "read_log"),
     "trpac.gap": ("Diagnosis", "diagnose"),
@@ -62,6 +64,7 @@ __all__ = [
     "diagnose",
     "effects",
     "estimate",
+    "example",
     "list_effects",
     "list_roads",
     "list_scenarios",

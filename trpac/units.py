@@ -26,7 +26,7 @@ def build_fmu(
     unit : str
         TrpacEstimator, TrpacEstimator4W, ReferencePlant or TorquePulses.
     kind : str
-        python, or native: TrpacEstimator or TrpacEstimator4W in C, whose host needs no Python (docs/guide/unit/native.md).
+        python, or native: TrpacEstimator or TrpacEstimator4W in C, without Python (docs/guide/unit/native.md).
     fmi : int
         Version of FMI: 2 for 2.0; of a native unit also 3 for 3.0.
     flat : bool

@@ -98,6 +98,31 @@ def run(
     console.print(f"Report: {out / 'report.html'}   figure: {out / 'figure17.png'}")
 
 
+@app.command()
+def example(
+    folder: Annotated[Path, typer.Argument(help="Folder for the files; it is made where it does not exist.")],
+) -> None:
+    """Write example files to try each command on: logs, car, road, mapping, camera and pictures.
+
+    Example: trpac example example, then
+    trpac estimate example/drive.csv --vehicle example/car.yaml --out out/drive
+
+    Exit codes: 0 done, 2 no place to write, and then nothing is written.
+    """
+    from trpac.example_files import example as write_example
+
+    require_folder("trpac example", folder)
+    try:
+        with bars() as progress:
+            written = write_example(folder, lambda done, total: progress("drawing pictures", done, total))
+    except (TrpacError, OSError) as error:
+        refuse("trpac example", error)
+    console = Terminal()
+    files = [path for path in written if path.parent == folder]
+    console.print("  ".join(str(path) for path in files), soft_wrap=True)
+    console.print(f"{folder / 'frames'}: {len(written) - len(files)} pictures")
+
+
 def _score_table(summary: dict) -> Table:
     """The table of scores for the terminal."""
     from scenarios.report import number, score_rows, title

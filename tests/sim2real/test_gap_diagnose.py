@@ -2,6 +2,7 @@
 
 import ast
 import json
+import math
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +22,7 @@ from sim2real.diagnose import diagnose, diagnose_files, shrink_on
 from sim2real.observing.drive import CHANNELS, RECOVERY_S, WHEEL, backward, make_drive
 from sim2real.reporting.report import jsonable
 from sim2real.result import Diagnosis, Verdict
-from sim2real.sources import read_sources, split
+from sim2real.sources import Given, read_source, read_sources, split
 from trpac_core.vehicle import WHEELS
 
 PAYLOAD = {"mass_offset": {"mass_kg": 180.0}}
@@ -298,17 +299,43 @@ def test_lost_samples_of_the_command_are_bridged():
 
 def test_a_log_names_its_road_after_an_at(tmp_path):
     common = Path("common.yaml")
-    assert split("a.csv@b.yaml", common) == (Path("a.csv"), Path("b.yaml"))
-    assert split("a.csv", common) == (Path("a.csv"), common)
-    assert split("me@home/a.csv", common) == (Path("me@home/a.csv"), common)
-    assert split("me@home/a.csv@b.yml", None) == (Path("me@home/a.csv"), Path("b.yml"))
-    assert split("a.csv@b.YAML", None) == (Path("a.csv"), Path("b.YAML"))
+    assert split("a.csv@b.yaml", common) == Given(Path("a.csv"), Path("b.yaml"))
+    assert split("a.csv", common) == Given(Path("a.csv"), common)
+    assert split("me@home/a.csv", common) == Given(Path("me@home/a.csv"), common)
+    assert split("me@home/a.csv@b.yml", None) == Given(Path("me@home/a.csv"), Path("b.yml"))
+    assert split("a.csv@b.YAML", None) == Given(Path("a.csv"), Path("b.YAML"))
     folder = tmp_path / "me@lab"
     folder.mkdir()
     (folder / "a.csv").touch()
-    assert split(f"{folder}/a.csv@{folder}/b.yaml", None) == (folder / "a.csv", folder / "b.yaml")
+    assert split(f"{folder}/a.csv@{folder}/b.yaml", None) == Given(folder / "a.csv", folder / "b.yaml")
     with pytest.raises(ScenarioError, match=r"a\.csv: names no road; expected LOG@ROAD\.yaml, or --road"):
         split("a.csv", None)
+
+
+def test_a_log_names_its_window_after_an_at(tmp_path):
+    common = Path("common.yaml")
+    assert split("a.csv@3:5.2", common) == Given(Path("a.csv"), common, 3.0, 5.2)
+    assert split("a.csv@:5", common) == Given(Path("a.csv"), common, -math.inf, 5.0)
+    assert split("a.csv@b.yaml@.5:", None) == Given(Path("a.csv"), Path("b.yaml"), 0.5, math.inf)
+    odd = tmp_path / "a@1:2"
+    odd.touch()
+    assert split(str(odd), common) == Given(odd, common)
+    with pytest.raises(ScenarioError, match=r"a\.csv@5:3: the window ends before it begins"):
+        split("a.csv@5:3", common)
+
+
+def test_windows_of_one_log_are_fitted_and_held_out(folder):
+    log, road = folder / "fit_1.csv", folder / "dry.yaml"
+    whole = read_source(f"{log}@{road}", None).log
+    middle = 0.5 * (whole.time_s[0] + whole.time_s[-1])
+    for fitted, overlaps in ((f"{log}@:{middle}", False), (f"{log}@:{middle + 1.0}", True)):
+        read = read_sources(folder / "vehicle.yaml", road, [fitted], f"{log}@{middle}:")
+        assert read.holdout.log.time_s[0] >= middle
+        assert read.fit[0].log.time_s[-1] < middle + overlaps
+        assert any("is a fit log, too" in text for text in read.holdout.log.warnings) is overlaps
+        assert read.fit[0].log.name.startswith("fit_1.csv from 0 to ")
+    with pytest.raises(ScenarioError, match="fewer than two rows from 1000 to 1001 s"):
+        read_source(f"{log}@1000:1001", road)
 
 
 def test_all_that_is_wrong_is_told_at_once(folder, tmp_path):

@@ -1,30 +1,25 @@
 """What a stranger does with an installed wheel, in an empty folder: `python wheel_check.py README.md`.
 
-Runs every Python block of the README in one namespace, then the commands; the first that fails ends it.
+Runs every block of the README that is not marked as by hand, then further commands; the first that fails ends it.
 """
 
 from __future__ import annotations
 
-import re
-import shutil
+import os
 import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
+
+from pages import run_page
 
 COMMANDS = (
     "trpac --version",
     "trpac run paper_simulation --out out/run",
-    "trpac gap demo --out out/gap",
-    "trpac vision classify frame.jpg --out classes.csv",
+    "trpac gap demo --out out/gap_demo",
+    "trpac vision classify example/frames --out classes.csv",
     "trpac hil --with-plant --duration-s 5 --quiet --out out/hil",
 )
-
-
-def blocks(readme: str) -> list[str]:
-    """The Python blocks of a page."""
-    return re.findall(r"```python\n(.*?)```", readme, re.DOTALL)
 
 
 def import_time_s() -> float:
@@ -43,21 +38,14 @@ def main(readme: Path) -> None:
 
     assert Path(trpac.__file__).is_relative_to(sys.prefix), f"{trpac.__file__} is not of this environment"
     assert not list(Path.cwd().iterdir()), "expected an empty folder"
+    os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     took_s = import_time_s()
     print(f"import trpac: {took_s:.2f} s", flush=True)
     assert took_s < 0.3
-    names: dict[str, Any] = {}
-    for block in blocks(readme.read_text(encoding="utf-8")):
-        began = time.monotonic()
-        exec(compile(block, "README.md", "exec"), names)
-        print(f"block of {len(block.splitlines())} lines: {time.monotonic() - began:.0f} s", flush=True)
-    shutil.copy(names["run"].frames[20], "frame.jpg")
+    run_page(readme)
     for command in COMMANDS:
         began = time.monotonic()
-        program, *arguments = command.split()
-        subprocess.run(
-            [str(Path(sys.executable).with_name(program)), *arguments], check=True, stdout=subprocess.DEVNULL
-        )
+        subprocess.run(command.split(), check=True, stdout=subprocess.DEVNULL)
         print(f"{command}: {time.monotonic() - began:.0f} s", flush=True)
 
 
