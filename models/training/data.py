@@ -30,6 +30,16 @@ STREET_SOURCES = {"cws8262": ("cws8262", "cws8262"), "sidhardha36": ("bdd_day", 
 ROAD_IS_FOUND = frozenset(name for names in STREET_SOURCES.values() for name in names)
 """Families whose patches are cut where the segmenter finds road, of all classes alike: of cws8262 only wet and snowy
 pictures have a mask, so that masks would tell the class."""
+FAMILIES = ROAD_IS_FOUND | {
+    "condition_web",
+    "drivable_camvid",
+    "drivable_lums",
+    "dry_udacity",
+    "other_cameras",
+    "seq_dry_yolop",
+    "seq_extreme",
+}
+"""Families that the shipped networks were trained and judged on: what cards say of data holds for these alone."""
 SQUASHED = ("condition_web", "cws8262")
 """Sources that have squeezed their pictures to squares."""
 

@@ -188,7 +188,9 @@ def _segmenter(
     real = [masked_sample(picture) for picture in of_split(facts.pictures, "val", masked=True)]
     painted = painted_views(real, seed=given.seed)
     found = {
-        "real: CamVid 0001TP (val)": {"drivable": score_segmenter(road.net, real, "drivable")},
+        "real (val)" if facts.own else "real: CamVid 0001TP (val)": {
+            "drivable": score_segmenter(road.net, real, "drivable")
+        },
         "real, painted (val)": {
             task: score_segmenter(road.net, painted, task) for task in ("drivable", "shadow")
         },
