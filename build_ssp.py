@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from functools import partial
 from pathlib import Path
 
 from fmu_src.build_command import EPILOG, Product, run_build
@@ -35,11 +34,11 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
 
     def load() -> Product:
-        from fmu_src.ssp import SYSTEMS
-        from fmu_src.ssp_build import build_system
+        from fmu_src.ssp import SYSTEMS, build_system
         from fmu_src.ssp_client import problems, simulate
 
-        build = partial(build_system, folder=options.out, kind=options.kind)
+        def build(name: str) -> Path:
+            return build_system(name, options.out, options.kind)
 
         def run(path: Path) -> str:
             simulate(path, RUN_S)

@@ -154,10 +154,12 @@ def examine(
         findings += _python(probed, modules if contents else None)
     intact = all(finding.state is not State.PROBLEM for finding in of_file)
     if intact and run:
-        notify(f"Now the unit's own code is run, with your rights: {quoted(path)}. --no-run leaves that out.")
+        notify(
+            f"The unit's own code now runs with your rights: {quoted(path)}. Use --no-run to prevent this."
+        )
         findings.append(_trial(path, python))
     else:
-        why = "the file is not what was built" if run else "as it was asked for"
+        why = "the file is not what was built" if run else "--no-run was given"
         findings.append(Finding("trial", State.NOTE, f"not run: {why}"))
     name = contents.unit if contents else path.stem
     return Examination(quoted(name), tuple(findings), probed, intact and run, native)
@@ -183,7 +185,7 @@ def examine_file(path: Path) -> tuple[Contents | None, tuple[Finding, ...]]:
         return contents, (
             whole,
             recorded,
-            Finding("description", State.NOTE, "not looked at: see the archive"),
+            Finding("description", State.NOTE, "not checked: see archive"),
         )
     return contents, (whole, recorded, _description(path))
 
@@ -191,7 +193,7 @@ def examine_file(path: Path) -> tuple[Contents | None, tuple[Finding, ...]]:
 def _archive(archive: Archive) -> Finding:
     if damaged := archive.damage():
         return Finding("archive", State.PROBLEM, f"damaged at {damaged}", "Copy or build the unit again.")
-    return Finding("archive", State.OK, f"{len(archive.names)} files, all checksums right")
+    return Finding("archive", State.OK, f"{len(archive.names)} files, all checksums correct")
 
 
 def _contents(archive: Archive) -> tuple[Contents | None, Finding]:
@@ -228,7 +230,7 @@ def _description(path: Path) -> Finding:
         problems = [quoted(error)]
     if problems:
         return Finding("description", State.PROBLEM, _some(problems), "Build the unit again.")
-    return Finding("description", State.OK, f"fmpy's validation finds nothing in {DESCRIPTION}")
+    return Finding("description", State.OK, f"fmpy's validation finds no problem in {DESCRIPTION}")
 
 
 def _run(command: list[str], limit_s: float) -> subprocess.CompletedProcess[str]:
@@ -273,7 +275,7 @@ def _python(python: Python, modules: list[str] | None) -> list[Finding]:
     else:
         found = Finding("python", State.OK, text)
     if modules is None:
-        return [found, Finding("packages", State.NOTE, "the file does not say what it needs")]
+        return [found, Finding("packages", State.NOTE, "the file has no list of the packages that it needs")]
     missing = {KNOWN_PACKAGES[m]: why for m, (good, why) in python.packages.items() if not good}
     if missing:
         mend = f"{python.command} -m pip install {' '.join(missing)}"
@@ -329,8 +331,8 @@ def _judged(done: subprocess.CompletedProcess[str]) -> Finding:
             return Finding("trial", State.PROBLEM, text)
         text = f"instantiates and steps, {answer['step_us']:.0f} us a step; ends in order"
     except UNREADABLE_ANSWER:
-        text = f"the process ended with {done.returncode}: {last_words or 'nothing said'}"
+        text = f"the process ended with {done.returncode}: {last_words or 'no message'}"
         return Finding("trial", State.PROBLEM, text)
     if log:
-        return Finding("trial", State.NOTE, f"runs, and says: {log}")
+        return Finding("trial", State.NOTE, f"runs, with messages: {log}")
     return Finding("trial", State.OK, text)

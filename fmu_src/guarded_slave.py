@@ -2,7 +2,7 @@
 
 The wrapper of pythonfmu frees the slave when an exception leaves a callback, while the host keeps its handle:
 the next call would use freed memory. It also passes log texts on as printf formats. This module handles both for all
-slaves; see docs/reference/unit.md.
+slaves; see findings 4 and 5 in lab/2026-11-29_findings_on_pythonfmu.md.
 """
 
 from __future__ import annotations

@@ -80,7 +80,10 @@ def _road_segment(number: int, start_m: float, theta: float, surface: int) -> tu
     name = f"road.segment_{number}"
     return (
         _parameter(
-            f"{name}.start", "m", f"Segment {number}: where it starts; it holds to the next one's", start_m
+            f"{name}.start",
+            "m",
+            f"Segment {number}: start; the segment ends where the next one starts",
+            start_m,
         ),
         *(
             _parameter(
@@ -91,7 +94,7 @@ def _road_segment(number: int, start_m: float, theta: float, surface: int) -> tu
         *(
             _whole(
                 f"{name}.class_{side}",
-                f"Segment {number}: {side} side is 0 dry, 1 wet, 2 snow or ice",
+                f"Segment {number}: surface class of the {side} side: 0 dry, 1 wet, 2 snow or ice",
                 surface,
                 0,
                 2,
@@ -107,7 +110,7 @@ _OUTPUTS = (
     _output(
         "longitudinal_acceleration",
         "m/s2",
-        "What an accelerometer in the centre of gravity reads",
+        "Acceleration that a sensor in the centre of gravity measures",
         None,
         10.0,
     ),
@@ -122,7 +125,7 @@ _OUTPUTS = (
             Kind.INTEGER,
             "output",
             "discrete",
-            f"{side.capitalize()} track: surface at preview.P_0 ahead of the front axle; 0 dry, 1 wet, 2 snow or ice",
+            f"{side.capitalize()} track: surface class preview.P_0 ahead of the axle: 0 dry, 1 wet, 2 snow or ice",
             minimum=0,
             maximum=2,
         )
@@ -145,8 +148,8 @@ _OUTPUTS = (
 )
 
 _PARAMETERS = (
-    _path("vehicle_path", "vehicle.yaml of the car; empty: the parameters vehicle.* and tyre.* say it"),
-    _path("road_path", "road.yaml; empty: the parameters road.* say it, which start as the paper's road"),
+    _path("vehicle_path", "Path of the car's vehicle.yaml; empty: the parameters vehicle.* and tyre.* apply"),
+    _path("road_path", "Path of a road.yaml; empty: the parameters road.* apply"),
     _parameter("vehicle.mass", "kg", "Mass of the car", 1343.8, 1.0, source="mass_kg"),
     _parameter("vehicle.wheelbase", "m", "Wheelbase", 2.305, 0.1, source="wheelbase_m"),
     _parameter("vehicle.track", "m", "Track width", 1.356, 0.1, source="track_m"),
@@ -161,7 +164,9 @@ _PARAMETERS = (
         0.01,
         source="cog_to_rear_axle_m",
     ),
-    _parameter("vehicle.wheel_radius", "m", "Rolling radius R", 0.29, 0.01, source="wheel_radius_m"),
+    _parameter(
+        "vehicle.wheel_radius", "m", "Effective rolling radius R", 0.29, 0.01, source="wheel_radius_m"
+    ),
     _parameter(
         "vehicle.wheel_inertia", "kg.m2", "Inertia I of a wheel", 1.2, 1e-3, source="wheel_inertia_kg_m2"
     ),
@@ -175,11 +180,11 @@ _PARAMETERS = (
         1000.0,
         source="tyre.longitudinal_stiffness_n",
     ),
-    _parameter("initial.vehicle_speed", "m/s", "Speed at the start, wheels rolling freely", 0.0, 0.0, 150.0),
+    _parameter("initial.vehicle_speed", "m/s", "Speed at the start, wheels roll freely", 0.0, 0.0, 150.0),
     _parameter("initial.position", "m", "Road coordinate of the front axle at the start", 0.0),
-    _parameter("preview.P_0", "m", "Way ahead of the front axle at which road_class looks", 2.5, 0.0),
-    _parameter("camera.confidence", "1", "What road_class_confidence says", 0.95, 0.0, 1.0),
-    _whole("road.segments", "How many segments the road has", 3, 1, len(ROAD)),
+    _parameter("preview.P_0", "m", "Distance ahead of the front axle to which road_class applies", 2.5, 0.0),
+    _parameter("camera.confidence", "1", "Value of road_class_confidence", 0.95, 0.0, 1.0),
+    _whole("road.segments", "Number of segments of the road", 3, 1, len(ROAD)),
     *(
         variable
         for number, segment in enumerate(ROAD, start=1)
@@ -192,7 +197,7 @@ REFERENCE_PLANT = (
         "wheel_torque",
         "input",
         "N.m",
-        "Torque, positive drives, negative brakes and holds at rest; constant over a step",
+        "Torque, positive drives, negative brakes and holds the car at rest; constant over a step",
         -MOST_TORQUE_NM,
         MOST_TORQUE_NM,
         300.0,

@@ -22,7 +22,7 @@ TORQUE_PULSES = (
             Kind.REAL,
             "output",
             "continuous",
-            f"{wheel_name[0].upper()}{wheel_name[1:]} wheel: torque for the step to come, positive drives",
+            f"{wheel_name[0].upper()}{wheel_name[1:]} wheel: torque for the next step, positive drives",
             "N.m",
             None,
             -MOST_TORQUE_NM,
@@ -34,7 +34,7 @@ TORQUE_PULSES = (
     _parameter(
         "drive.torque", "N.m", "Torque of a driving pulse at each driven wheel", 240.0, 0.0, MOST_TORQUE_NM
     ),
-    _parameter("drive.duration", "s", "How long a driving pulse lasts, ramps included", 1.5, 0.0, None),
+    _parameter("drive.duration", "s", "Duration of a driving pulse, ramps included", 1.5, 0.0, None),
     _parameter(
         "brake.torque",
         "N.m",
@@ -43,9 +43,9 @@ TORQUE_PULSES = (
         0.0,
         MOST_TORQUE_NM,
     ),
-    _parameter("brake.duration", "s", "How long a braking pulse lasts, ramps included", 0.4, 0.0, None),
-    _parameter("pulse.ramp", "s", "How long a pulse rises and falls", 0.05, 1e-6, None),
-    _parameter("pulse.pause", "s", "Rest before each driving and before each braking pulse", 0.1, 0.0, None),
+    _parameter("brake.duration", "s", "Duration of a braking pulse, ramps included", 0.4, 0.0, None),
+    _parameter("pulse.ramp", "s", "Duration of the rise and of the fall of a pulse", 0.05, 1e-6, None),
+    _parameter("pulse.pause", "s", "Pause before each driving and each braking pulse", 0.1, 0.0, None),
     _parameter(
         "drive.front_share",
         "1",
@@ -54,6 +54,13 @@ TORQUE_PULSES = (
         0.0,
         1.0,
     ),
-    _parameter("drive.rear_share", "1", "The same of the rear wheels", 1.0, 0.0, 1.0),
+    _parameter(
+        "drive.rear_share",
+        "1",
+        "Torque of the rear wheels in a driving pulse, as a share of drive.torque",
+        1.0,
+        0.0,
+        1.0,
+    ),
 )
 """Variables of the unit `TorquePulses`."""

@@ -64,7 +64,7 @@ KNOWN_AT_START: dict[str, str] = {}
 missing attribute."""
 
 LOG_CATEGORIES = {
-    "logStatusWarning": "An unusable input: the last good estimate is held; or a car that is not as told.",
+    "logStatusWarning": "An unusable input: the last good estimate is held. Or signals that contradict the parameters.",
     "logStatusError": "A parameter, a call or a state that could not be used.",
 }
 

@@ -15,7 +15,7 @@ PARAMETERS = (
         Kind.BOOLEAN,
         "parameter",
         "fixed",
-        "Pictures in memory are read; false: the inputs image.* are never followed",
+        "Pictures in memory are read; false: the inputs image.* are ignored",
         start=True,
     ),
 )

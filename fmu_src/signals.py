@@ -30,19 +30,20 @@ def _signal(
 
 _input, _output = partial(_signal, "input"), partial(_signal, "output")
 
-WRONG_ADDRESS = "An address that cannot be read is a warning, and no frame; macOS: no frame"
+WRONG_ADDRESS = "An address that cannot be read gives a warning and no frame; not available on macOS"
 
 INPUTS = (
     _input("wheel_speed", "rad/s", "Rotational speed of the wheel, positive forwards", nominal=100.0),
-    _input("wheel_torque", "N.m", "Torque on the wheel, brakes included; positive drives", nominal=300.0),
+    _input(
+        "wheel_torque", "N.m", "Drive torque minus brake torque at the wheel, positive drives", nominal=300.0
+    ),
     _input("vehicle_speed", "m/s", "Longitudinal speed of the car, positive forwards", nominal=30.0),
     Variable(
         "image_path",
         Kind.STRING,
         "input",
         "discrete",
-        "Path of the newest camera picture; a changed path or frame_id is a new frame (the same path again: set a new "
-        "frame_id), an empty one is none",
+        "Path of the newest camera picture; a new path or a new frame_id marks a new frame; empty: no picture",
         start="",
     ),
     Variable(
@@ -50,7 +51,7 @@ INPUTS = (
         Kind.INTEGER,
         "input",
         "discrete",
-        "Number of the newest frame; 0 where frames have no numbers",
+        "Number of the newest frame; 0: frames have no numbers",
         start=0,
     ),
     *(
@@ -59,7 +60,7 @@ INPUTS = (
             Kind.INTEGER,
             "input",
             "discrete",
-            f"{meaning} of the newest picture in memory, set for one step; 0 is none. {WRONG_ADDRESS}",
+            f"{meaning} of the newest picture in memory, set for one step; 0: no picture. {WRONG_ADDRESS}",
             start=0,
             binary="image",
         )
@@ -75,7 +76,7 @@ INPUTS = (
             Kind.INTEGER,
             "input",
             "discrete",
-            f"{side.capitalize()} in pixels of a picture in memory that is raw BGR, 8 bits each; 0: it is JPEG or PNG",
+            f"{side.capitalize()} in pixels of a raw BGR picture in memory, 8 bits a channel; 0: it is JPEG or PNG",
             start=0,
             minimum=0,
         )
@@ -86,7 +87,7 @@ INPUTS = (
         Kind.INTEGER,
         "input",
         "discrete",
-        "Road surface class by bus instead of a picture: 0 dry, 1 wet, 2 snow or ice; -1 is none",
+        "Road surface class as a number, used instead of a picture: 0 dry, 1 wet, 2 snow or ice; -1: no class",
         start=NO_ROAD_CLASS,
         minimum=NO_ROAD_CLASS,
         maximum=int(max(Surface)),
@@ -95,20 +96,20 @@ INPUTS = (
     _input(
         "vertical_load",
         "N",
-        "Vertical load; as long as it has only been 0, the load follows from mass and acceleration",
+        "Vertical load; not connected (always 0): the load is computed from mass and acceleration",
         nominal=3000.0,
     ),
     _input("steering_angle", "rad", "Steering angle of the front wheels, positive to the left"),
     _input(
         "longitudinal_acceleration",
         "m/s2",
-        "Longitudinal acceleration; as long as it has only been 0, the speed is differentiated",
+        "Longitudinal acceleration; not connected (always 0): the vehicle speed is differentiated",
         nominal=10.0,
     ),
     _input(
         "yaw_rate",
         "rad/s",
-        "Yaw rate, positive to the left; as long as it has only been 0, it follows from the steering angle",
+        "Yaw rate, positive to the left; not connected (always 0): computed from the steering angle",
     ),
 )
 
@@ -125,7 +126,7 @@ OUTPUTS = (
         Kind.BOOLEAN,
         "output",
         "discrete",
-        "Visual information confidence flag epsilon at the wheel now",
+        "Visual information confidence flag epsilon: the class of the road under the wheel is used",
     ),
     _output("K_v", "1/s", "Auxiliary gain of the visual term in form (18); without unit in form (17)", 0.0),
     Variable(
@@ -133,43 +134,63 @@ OUTPUTS = (
         Kind.BOOLEAN,
         "output",
         "discrete",
-        "The estimator runs: slip is above the threshold",
+        "Slip is above the excitation threshold, the estimate is updated",
     ),
-    _output("excitation_threshold", "1", "Slip above which the estimator runs", 0.0, 1.0),
+    _output("excitation_threshold", "1", "Slip above which the estimate is updated", 0.0, 1.0),
     _output("slip", "1", "Longitudinal slip, unsigned", 0.0, 1.0),
     _output("tyre_force", "N", "Observed longitudinal tyre force, positive drives", nominal=1000.0),
-    _output("TRPAC_image", "1", "Adhesion of the class that the camera gave the road under the wheel", 0.0),
+    _output(
+        "TRPAC_image", "1", "Adhesion that belongs to the camera's class of the road under the wheel", 0.0
+    ),
     _output("TRPAC_dynamics", "1", "Adhesion estimated from the dynamics alone", 0.0, GREATEST_THETA),
     _output(
-        "TRPAC_peak", "1", "Maximum of the tyre's friction curve at TRPAC, as a friction tester measures", 0.0
+        "TRPAC_peak",
+        "1",
+        "Maximum of the tyre's friction curve at TRPAC, as a friction tester measures it",
+        0.0,
     ),
     _output(
         "image_confidence",
         "1",
-        "Confidence Q_v of the road under the wheel, 0 where there is none",
+        "Confidence Q_v of the class of the road under the wheel; 0: no class",
         0.0,
         1.0,
     ),
     _output(
         "frame_age",
         "s",
-        "Time since the picture of the road under the wheel was taken; -1 where there is none",
+        "Time since the picture of the road under the wheel was taken; -1: no picture",
         -1.0,
     ),
     _output("TRPAC_std", "1", "Standard deviation of TRPAC", 0.0),
 )
 
 INTERVAL_OUTPUTS = (
-    _output("TRPAC_low", "1", "Lower bound of the interval that holds the road's TRPAC with 95 %", 0.0),
-    _output("TRPAC_high", "1", "Upper bound of that interval", 0.0),
-    _output("TRPAC_expected", "1", "Mean of what the road's TRPAC may be", 0.0),
-    _output("TRPAC_expected_std", "1", "Standard deviation of what it may be", 0.0),
+    _output(
+        "TRPAC_low",
+        "1",
+        "Lower bound of the interval that contains the road's TRPAC with 95 % probability",
+        0.0,
+    ),
+    _output(
+        "TRPAC_high",
+        "1",
+        "Upper bound of the interval that contains the road's TRPAC with 95 % probability",
+        0.0,
+    ),
+    _output("TRPAC_expected", "1", "Mean of the probability distribution of the road's TRPAC", 0.0),
+    _output(
+        "TRPAC_expected_std",
+        "1",
+        "Standard deviation of the probability distribution of the road's TRPAC",
+        0.0,
+    ),
     Variable(
         "TRPAC_source",
         Kind.INTEGER,
         "output",
         "discrete",
-        "What TRPAC rests on: 0 nothing read on this road, 1 the tyre, 2 a flagged class of the camera, 3 both",
+        "Sources of TRPAC: 0 none on this road, 1 tyre force and slip, 2 camera class with the flag set, 3 both",
         minimum=min(Source),
         maximum=max(Source),
     ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +13,7 @@ from trpac_core.vehicle import WHEELS
 
 from .interface_4w import TRPAC_ESTIMATOR_4W
 from .interface_plant import REFERENCE_PLANT
+from .kinds import NATIVE, PYTHON, build, known_units
 from .packaging import BuildError, write_archive
 from .units import STEP_S, UNITS
 
@@ -141,6 +143,42 @@ def _one_wheel() -> Wiring:
 
 SYSTEMS = {"four_wheels": _four_wheels(), "one_wheel": _one_wheel()}
 """Systems by the name that `build_ssp.py --system` takes."""
+
+
+def build_system(name: str, folder: str | Path, kind: str = PYTHON) -> Path:
+    """Build a system's units and its package; returns the package's path.
+
+    Parameters
+    ----------
+    name : str
+        One of `SYSTEMS`.
+    folder : path
+        Made where it is missing.
+    kind : str
+        Kind of the estimator; the others need Python. With native the file is NAME_native.ssp.
+
+    Raises
+    ------
+    BuildError
+        If there is no such system or kind, or a unit cannot be built.
+    OSError
+        If the archive cannot be written.
+
+    Examples
+    --------
+    >>> build_system("four_wheels", "dist")  # doctest: +SKIP
+    PosixPath('dist/trpac_four_wheels.ssp')
+    """
+    if name not in SYSTEMS:
+        raise BuildError(f"{name!r} is not a system. Known: {', '.join(SYSTEMS)}.")
+    wiring, of_kind = SYSTEMS[name], known_units(kind)
+    with tempfile.TemporaryDirectory(prefix="trpac_ssp_") as scratch:
+        units = {
+            unit: build(unit, Path(scratch), kind=kind if unit in of_kind else PYTHON)
+            for unit in wiring.elements.values()
+        }
+        ending = "_native" if kind == NATIVE else ""
+        return build_package(wiring, units, Path(folder) / f"{wiring.name}{ending}.ssp")
 
 
 def build_package(wiring: Wiring, units: Mapping[str, Path], target: Path) -> Path:

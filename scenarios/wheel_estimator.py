@@ -119,7 +119,7 @@ class Estimator:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on what the drive shows of a car that is not as told, with the method robust."""
+        """Warnings about a car that differs from its description, with the method robust."""
         return tuple(self._estimator.messages().values())
 
     def step(

@@ -33,7 +33,7 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
 def pytest_unconfigure(config: pytest.Config) -> None:
     """End with the tests' verdict: pythonfmu's plain slaves, which some tests run, corrupt the heap at the end.
 
-    See the findings in docs/reference/unit.md; processes with the units alone end in order.
+    See finding 10 in lab/2026-11-29_findings_on_pythonfmu.md; processes with the units alone end in order.
     """
     if EXIT_STATUS in config.stash:
         sys.stdout.flush()

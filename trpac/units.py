@@ -26,7 +26,8 @@ def build_fmu(
     unit : str
         TrpacEstimator, TrpacEstimator4W, ReferencePlant or TorquePulses.
     kind : str
-        python, or native: TrpacEstimator or TrpacEstimator4W in C, without Python (docs/guide/unit/native.md).
+        python, or native: TrpacEstimator or TrpacEstimator4W in C, whose host needs no Python; building one needs a C
+        compiler (docs/guide/unit/native.md).
     fmi : int
         Version of FMI: 2 for 2.0; of a native unit also 3 for 3.0.
     flat : bool
@@ -73,10 +74,10 @@ def build_ssp(folder: str | Path, *, system: str = "four_wheels", kind: str = "p
         Without the extra 'fmu'.
     """
     with extras("build_ssp", "fmu"):
-        from fmu_src.ssp_build import build_system
+        from fmu_src.ssp import build_system
         from fmu_src.ssp_client import problems
 
-        path = build_system(system, Path(folder), kind=kind)
+        path = build_system(system, folder, kind)
         if found := problems(path):
             raise TrpacError("\n".join(f"{path}: {problem}" for problem in found))
     return path

@@ -1,4 +1,4 @@
-"""The commands `trpac fmu`: units as other tools see them."""
+"""The commands `trpac fmu`: build a unit, and examine one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from trpac_cli.console import refuse
+from fmu_src.kinds import KINDS, PYTHON
+from trpac_cli.console import refuse, require_folder
+from trpac_core.errors import TrpacError
 
 if TYPE_CHECKING:
     from fmu_src.doctor import Examination
@@ -22,13 +24,51 @@ EXIT_PROBLEMS = 1
 COLOURS = {"ok": "green", "note": "yellow", "problem": "red"}
 
 app = typer.Typer(
-    help="Co-simulation units: what is wrong with one, and what a host needs.", no_args_is_help=True
+    help="Co-simulation units: build one, check one, and list what a host needs.", no_args_is_help=True
 )
 
 
-@app.callback()
-def _root() -> None:
-    """Group of the commands, so that `doctor` is a subcommand though it is the only one."""
+@app.command()
+def build(
+    unit: Annotated[
+        str,
+        typer.Option(help="TrpacEstimator, TrpacEstimator4W, ReferencePlant or TorquePulses."),
+    ] = "TrpacEstimator",
+    kind: Annotated[
+        str,
+        typer.Option(
+            metavar="|".join(KINDS),
+            help="python: with the networks; the host needs Python.\n\nnative: in C, without pictures; the host needs "
+            "nothing. Only the two estimators have this kind, and building one needs a C compiler: the program in CC, "
+            "else cc, or the package ziglang, which compiles for all platforms.",
+        ),
+    ] = PYTHON,
+    fmi: Annotated[int, typer.Option(metavar="2|3", help="Version of FMI; 3 for native units only.")] = 2,
+    flat: Annotated[
+        bool,
+        typer.Option("--flat", help="Names with _ for dots, for tools that make structures of dotted names."),
+    ] = False,
+    out: Annotated[Path, typer.Option(help="Folder for the unit; made where it is missing.")] = Path("dist"),
+) -> None:
+    """Build a co-simulation unit, validate it with fmpy, and print its path.
+
+    The file is UNIT.fmu, with _native, _fmi3 and _flat before the dot. The same sources give the same bytes.
+
+    Example: trpac fmu build --unit TrpacEstimator4W --out dist
+
+    For a real-time target: trpac fmu build --kind native
+
+    For Simulink: trpac fmu build --kind native --flat
+
+    Exit codes: 0 done, 2 unknown unit, kind or version, no C compiler, or no place to write.
+    """
+    import trpac
+
+    require_folder("trpac fmu build", out)
+    try:
+        print(trpac.build_fmu(out, unit=unit, kind=kind, fmi=fmi, flat=flat))
+    except (TrpacError, OSError) as error:
+        refuse("trpac fmu build", error)
 
 
 @app.command()
@@ -42,17 +82,17 @@ def doctor(
     ] = sys.executable,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")] = False,
     run: Annotated[
-        bool, typer.Option("--run/--no-run", help="Run the unit's own code; --no-run looks at the file only.")
+        bool, typer.Option("--run/--no-run", help="Run the unit's own code; --no-run reads the file only.")
     ] = True,
 ) -> None:
-    """Examine a unit, and say what a host needs to run it.
+    """Check a unit, and list what a host needs to run it.
 
-    Looks at the archive and its checksums, at every file against the hash that the build recorded (a network that was
-    damaged or exchanged is named), at modelDescription.xml with fmpy's validation, at the interpreter and its packages;
-    then instantiates the unit and steps it in a process of its own, so that a crash is a line in the table. That runs
-    code out of the file with your rights: give --no-run for a file that you do not trust.
+    It checks the archive and its checksums, every file against the hash that the build recorded (a damaged or
+    exchanged network is named), modelDescription.xml with fmpy's validation, and the interpreter with its packages.
+    Then it instantiates and steps the unit in a separate process, so that a crash is a line in the table. This runs
+    code from the file with your rights: give --no-run for a file that you do not trust.
 
-    The second table tells what each kind of host needs, with this interpreter's paths filled in.
+    The second table lists what each kind of host needs, with the paths of this interpreter.
 
     Example: trpac fmu doctor dist/TrpacEstimator.fmu
 
@@ -96,7 +136,7 @@ def _json(file: Path, examined: Examination, needs: tuple[HostNeeds, ...]) -> di
 
 def _show(console: Console, file: Path, examined: Examination, needs: tuple[HostNeeds, ...]) -> None:
     findings = Table(title=escape(f"{examined.unit} ({file})"), title_justify="left")
-    for heading in ("looked at", "", "found"):
+    for heading in ("check", "", "result"):
         findings.add_column(heading, overflow="fold")
     for finding in examined.findings:
         state = finding.state.value

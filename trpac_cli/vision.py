@@ -43,9 +43,9 @@ def classify(
     out: Annotated[Path, typer.Option(help="CSV file to write.")],
     bits: Bits = None,
 ) -> None:
-    """Tell the surface of road pictures of any camera: dry, wet, or snow and ice.
+    """Classify the road surface in pictures of any camera: dry, wet, or snow and ice.
 
-    Looks at road out of the shadow in the lower centre of each picture. No camera file is needed.
+    Uses road out of the shadow in the lower centre of each picture. No camera file is needed.
 
     Example: trpac vision classify my_pictures --out classes.csv
 

@@ -1,7 +1,7 @@
 """Force observer and estimator of Eqs. (14) to (18) of Tian et al. 2022, run where the tyre slides with significance.
 
-Print runs the estimator above a slip threshold that follows the camera's class. Noise then lets a tyre that only
-stretches seem to slide, and the estimate sinks; and a wrong class "dry" sets the threshold above all slip of a wet
+Print runs the estimator above a slip threshold that follows the camera's class. Noise then makes an adhering
+tyre seem to slide, and the estimate falls; and a wrong class "dry" sets the threshold above all slip of a wet
 road. Here theta(lambda, F_hat) counts where a tyre that does not slide would need less slip than there surely is.
 """
 
@@ -72,7 +72,7 @@ class Wheel:
 
 
 class WheelInputs(NamedTuple):
-    """What one wheel's estimator is given at a step."""
+    """Inputs of the estimator of one wheel at a step."""
 
     wheel_speed_rad_s: float
     wheel_speed_ahead_rad_s: float

@@ -89,7 +89,7 @@ class TrpacEstimator:
         frame: NDArray[np.uint8] | RoadClass | None = None,
         frame_failed: bool = False,
     ) -> Estimate:
-        """One step: sensors are read at its start and go on over it as they came.
+        """The estimate after one step; sensors are read at its start and held over it.
 
         Parameters
         ----------
@@ -136,7 +136,7 @@ class TrpacEstimator:
         return estimate
 
     def _classified(self, picture: NDArray[np.uint8], sensors: Sensors, usable: bool) -> Outcome:
-        """The verdict on a picture; usable readings tell how the car moves."""
+        """The result of a picture; usable readings give the motion of the car."""
         if self._ife is None:
             raise TypeError("A picture came, but the estimator was made without an image estimator.")
         state, acceleration_m_s2 = self._state, self._state.acceleration_m_s2
@@ -153,7 +153,7 @@ class TrpacEstimator:
         return Outcome(result.surface, result.Q_v, result.flag, state.time_s)
 
     def messages(self) -> dict[str, str]:
-        """Sentences on what the drive shows of a car that is not as told, by what they concern; none as printed."""
+        """Warnings about a car that differs from its description, by subject; none for the method as printed."""
         state, known = self._state.robust, self._known.robust
         axle = "Front" if self.config.front_axle else "Rear"
         texts = {

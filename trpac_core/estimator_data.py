@@ -1,4 +1,4 @@
-"""What the estimator of one wheel is set to, what it says and what it remembers."""
+"""Settings, output and state of the estimator of one wheel."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ class RoadClass:
 
 
 class Method(Enum):
-    """Which estimator makes TRPAC."""
+    """The estimator that computes TRPAC."""
 
     AS_PRINTED = 0
     """Eqs. (12) to (19) of the paper as they are printed."""
     DIFE = 1
-    """The paper's, run where the tyre slides with significance."""
+    """The paper's fusion, run only where the tyre slides with statistical significance."""
     ROBUST = 2
-    """The observer without the camera, in the belief's bounds, on a road that it has read; else the belief's mean."""
+    """The observer without camera, within the bounds of the belief; the belief's mean until it has read this road."""
 
     @property
     def label(self) -> str:
@@ -96,17 +96,17 @@ class EstimatorConfig:
     left_side : bool
         Whether it is on the left: which wheel's track the camera follows.
     vision : IfeConfig
-        Settings of the image estimator but for what the vehicle and the wheel already say, see `image_settings`.
+        Settings of the image estimator except those that follow from the vehicle and the wheel, see `image_settings`.
     gains, preview
         Settings of the parts.
     tolerance : CarTolerance
-        How well the car is known; `vehicle.EXACT_CAR` where it is just as told.
+        Tolerances of the car; `vehicle.EXACT_CAR` where it agrees with its description.
     class_theta : tuple of 3 floats
         Adhesion of dry, wet, snow and ice [-].
     theta_initial : float
         The observer's estimate before anything is known: a dry road [-].
     floor_m_s : float
-        Speed below which slip says nothing. At 1 m/s a speed error of 0.014 m/s is a slip of 0.014, as
+        Speed below which slip is not used. At 1 m/s a speed error of 0.014 m/s is a slip of 0.014, as
         large as the excitation threshold [m/s].
     sensor_filter_s : float
         Time constant of the filter on wheel speed, torque, vehicle speed and measured acceleration. The tyre's curve
@@ -119,7 +119,7 @@ class EstimatorConfig:
     acceleration_filter_s : float
         Time constant for the acceleration that the load follows where it is differentiated from speed [s].
     method : Method
-        Which estimator makes TRPAC.
+        The estimator that computes TRPAC.
     """
 
     vehicle: Vehicle = field(default_factory=Vehicle)
@@ -155,7 +155,7 @@ class EstimatorConfig:
 
 
 class Estimate(NamedTuple):
-    """What the estimator says at a step."""
+    """Output of the estimator at a step."""
 
     TRPAC: float
     """Estimated adhesion of the road under the wheel [-]."""
@@ -182,15 +182,15 @@ class Estimate(NamedTuple):
     TRPAC_std: float
     """Standard deviation of TRPAC [-]."""
     load_n: float
-    """Vertical load that all this rests on [N]."""
+    """Vertical load that is used [N]."""
     longitudinal_stiffness_n: float
-    """Told C_x [N]."""
+    """C_x of the vehicle description [N]."""
     TRPAC_low: float
     """Lower bound of the interval that holds the road's TRPAC with 95 % [-]."""
     TRPAC_high: float
     """Its upper bound [-]."""
     TRPAC_expected: float
-    """Expected friction, whatever the tyre shows now [-]."""
+    """Mean of the belief: friction to expect before the tyre shows it [-]."""
     TRPAC_expected_std: float
     """Its standard deviation [-]."""
     source: Source
@@ -199,7 +199,7 @@ class Estimate(NamedTuple):
 
     @property
     def TRPAC_peak(self) -> float:
-        """Maximum of the tyre's curve at TRPAC: what a brake test measures, worked out when it is asked for [-]."""
+        """Maximum of the tyre curve at TRPAC, which a brake test measures; computed on access [-]."""
         return peak_friction(self.TRPAC, self.load_n, self.longitudinal_stiffness_n)
 
 
@@ -223,12 +223,12 @@ OUTPUTS = (
     "TRPAC_expected_std",
     "source",
 )
-"""What of an estimate a table or a bus shows."""
+"""Fields of an estimate that tables and buses show."""
 
 
 @dataclass(slots=True)
 class EstimatorState:
-    """All that the estimator remembers; brought up to date in place, once all of a step is worked out."""
+    """State of the estimator; changed in place at the end of a step."""
 
     fusion: FusionState
     dynamics: FusionState
@@ -300,7 +300,7 @@ _PARTS: Mapping[str, Any] = {
 
 @dataclass(slots=True)
 class Rates:
-    """What follows from the step size alone."""
+    """Values that depend on the step size only."""
 
     step_s: float
     sensor_share: float
@@ -314,7 +314,7 @@ class Rates:
     most_rim_m_s: float
     """How far the rim's speed may be from its filter [m/s]."""
     ahead: float
-    """Share of the way over the step at which the force observer sees what changes evenly over it [-]."""
+    """Share of the step at which the force observer samples an input that changes linearly over it [-]."""
     differentiator_1_s: float
     """Acceleration by the speed's distance from the filter that differentiates it [1/s]."""
 

@@ -1,4 +1,4 @@
-"""The one way to files of others: regular, of a bounded size, and quoted in messages as short, plain text."""
+"""Reading of foreign files: regular files of bounded size, quoted in messages as short, plain text."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def open_file(path: str | Path, most_bytes: int, expected: str) -> BufferedReade
     most_bytes : int
         Size above which it is refused unread.
     expected : str
-        What messages say that it should be, such as "a YAML file".
+        The expected content in messages, such as "a YAML file".
 
     Raises
     ------
@@ -125,7 +125,7 @@ def file_sha256(path: str | Path) -> str:
 
 
 def parse_json(data: bytes | str, name: str) -> Any:
-    """What a JSON text says; raises FileError with `name` where it is damaged, or nested without end."""
+    """The content of a JSON text; raises FileError with `name` where it is damaged, or nested without end."""
     try:
         return json.loads(data)
     except (ValueError, RecursionError) as error:

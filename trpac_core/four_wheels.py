@@ -67,7 +67,7 @@ class FourWheelsConfig:
         Of each wheel; which wheel it is, is set for each.
     axle_deviation : float
         How far friction may differ between the wheels of one side, a wheelbase apart: the standard deviation of the
-        road's change over that way, about 0.05 per root of a metre [-].
+        road's change over that distance, about 0.05 per root of a metre [-].
     """
 
     wheel: EstimatorConfig = field(default_factory=EstimatorConfig)
@@ -79,7 +79,7 @@ class FourWheelsConfig:
 
 
 class CarEstimate(NamedTuple):
-    """What the estimators say at a step."""
+    """Outputs of the estimators at a step."""
 
     wheels: tuple[Estimate, Estimate, Estimate, Estimate]
     TRPAC: float
@@ -147,7 +147,7 @@ def lateral_plausible(sensors: CarSensors) -> bool:
 def car_loads(car: Vehicle, known: CarSetup, sensors: CarSensors) -> CarLoads:
     """Vertical loads.
 
-    A wheel works the load out itself, from the filtered acceleration, unless a sensor or a lateral transfer tells.
+    A wheel computes the load itself, from the filtered acceleration, unless a sensor or a lateral transfer gives it.
     Where the lateral acceleration is no good reading all are NaN, which no wheel takes, used or not.
     """
     loads = known.static_n
@@ -262,7 +262,7 @@ def car_claim(
 
 
 class FourWheels:
-    """Four one-wheel estimators that share a camera; each goes on where another's sensors fail.
+    """Four one-wheel estimators that share a camera; each continues when the sensors of another fail.
 
     A picture is segmented once; the patches of the left and of the right track are classified in one run, and each
     side's verdict goes to its two wheels. A rear wheel reaches the road that was seen a wheelbase later.
@@ -313,7 +313,7 @@ class FourWheels:
         Returns
         -------
         CarEstimate
-            A wheel whose readings are unusable holds its last good estimate, and `problems` says why; the others go on.
+            A wheel whose readings are unusable holds its last good estimate; `problems` has the reason.
 
         Raises
         ------
@@ -371,7 +371,7 @@ class FourWheels:
     def _classes(
         self, sensors: CarSensors, frame: NDArray[np.uint8] | SideClasses | None
     ) -> tuple[RoadClass | None, RoadClass | None]:
-        """What a new frame says of the left and of the right track; nothing where the car's motion is not known."""
+        """Results of a new frame for the left and the right track; none where the motion of the car is unknown."""
         if frame is None or isinstance(frame, SideClasses):
             return frame or (None, None)
         if self._ife is None:
@@ -395,7 +395,7 @@ class FourWheels:
         return RoadClass(result.surface, result.told_by_bus(self.config.wheel.vision.flag_threshold))
 
     def messages(self) -> dict[str, str]:
-        """Sentences on what the drive shows of a car that is not as told, once per axle and matter."""
+        """Warnings about a car that differs from its description, once per axle and subject."""
         fl, fr, rl, rr = (wheel.messages() for wheel in self._wheels)
         return fr | fl | rr | rl
 

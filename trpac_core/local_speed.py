@@ -1,4 +1,4 @@
-"""The speed of the road under each wheel of a car that turns: what a wheel slips against in a curve."""
+"""The speed of the road under each wheel of a turning car, the reference of slip in a curve."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _FASTEST, _TURNING, _STEERED = (
 
 
 def motion_known(speed_m_s: float, steering_angle_rad: float, yaw_rate_rad_s: float | None) -> bool:
-    """Whether the readings that tell how the car moves are what a road car gives."""
+    """Whether the readings of the motion are plausible for a road car."""
     turning = yaw_rate_rad_s or 0.0
     return abs(speed_m_s) <= _FASTEST and abs(steering_angle_rad) <= _STEERED and abs(turning) <= _TURNING
 
@@ -30,12 +30,12 @@ def local_speeds(
     speed_m_s, steering_angle_rad : float
         Of the car, and of its front wheels, left positive [m/s], [rad].
     yaw_rate_rad_s : float or None
-        Left positive [rad/s]; without one the steering angle tells the curve.
+        Left positive [rad/s]; without one the steering angle gives the curve.
 
     Returns
     -------
     tuple of float
-        fl, fr, rl, rr [m/s]. Where a reading is no good the car's speed stands for all: each wheel will say so itself.
+        fl, fr, rl, rr [m/s]. Where a reading is unusable: the speed of the car.
     """
     if not motion_known(speed_m_s, steering_angle_rad, yaw_rate_rad_s):
         return (speed_m_s, speed_m_s, speed_m_s, speed_m_s)

@@ -51,7 +51,7 @@ def settled_state(
 
 
 def seen_at(x: float) -> float:
-    """Share of the way over a step at which an input that changes evenly counts for Eq. (15), x = K dt. [-].
+    """Share of the step at which an input that changes linearly counts for Eq. (15), x = K dt. [-].
 
     The mean of t / dt over the step, weighted as the observer forgets, with exp(-K (dt - t)): half of the way for short
     steps, the end of long ones.
@@ -80,7 +80,7 @@ def advanced_state(
     s : float
         Inner state now [rad/s^2].
     model_force_n, model_change_n : float
-        F_z mu sigma at theta_hat, and what theta_hat's way over the step changes it by [N].
+        F_z mu sigma at theta_hat, and its change by theta_hat over the step [N].
     wheel_torque_nm, wheel_speed_rad_s : float
         Where they are `seen_at` of the step [N m], [rad/s]: with those of its start the inertia's share of a wheel that
         gains speed would be counted K dt / (1 - exp(-K dt)) times.

@@ -1,4 +1,4 @@
-"""What the car measures, what makes a reading unusable, and the one filter that all readings pass."""
+"""Sensor readings, the reasons that make them unusable, and the filter that all readings pass."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ GREATEST_ACCELERATION_M_S2 = 15.0
 """No road car's tyres give more: a steeper change of speed is a jump of the signal [m/s^2]."""
 
 LONGEST_STEP_S = 10.0
-"""Over a longer step nobody knows where the car has gone [s]."""
+"""Longest step; after a longer one the position is unknown [s]."""
 JUMP_M_S, RIM_JUMP_M_S = 1.5, 8.0
 """How far a reading may be from its filter: a bus of 20 Hz at 15 m/s^2, and a wheel that a full brake locks [m/s]."""
 RIM_ACCELERATION_M_S2 = 750.0
@@ -32,7 +32,7 @@ RIM_ACCELERATION_M_S2 = 750.0
 
 @dataclass(slots=True)  # frozen, its making would take 1 us, four times a step
 class Sensors:
-    """What the car measures now. What is None is not connected and is replaced as the estimator documents.
+    """Sensor readings now. None means not connected; the estimator documents what replaces it.
 
     Torque is positive where it drives, brakes included; steering angle of the front wheels and yaw rate are
     positive to the left.
@@ -65,7 +65,7 @@ class FilteredReadings(NamedTuple):
 
 
 def filter_share(step_s: float, time_constant_s: float) -> float:
-    """How much of the way to a held value a first-order filter goes in a step [-]."""
+    """Share of the difference to a held value that a first-order filter covers in a step [-]."""
     return 1.0 - math.exp(-step_s / time_constant_s)
 
 
@@ -104,7 +104,7 @@ def plausible(sensors: Sensors) -> bool:
 
 
 def unusable(step_s: float, sensors: Sensors, wheel_radius_m: float, floor_m_s: float) -> Unusable:
-    """What makes a step's input unusable.
+    """The reason why the input of a step is unusable.
 
     A wheel that reads a little below 0 is locked, not reversed: what counts is its speed against the floor.
     """

@@ -20,7 +20,7 @@ class Slip(NamedTuple):
 def wheel_slip(
     wheel_speed_rad_s: float, vehicle_speed_m_s: float, wheel_radius_m: float, floor_m_s: float
 ) -> Slip:
-    """Slip of a wheel that rolls forwards; at standstill there is none.
+    """Slip of a wheel that rolls forwards; 0 at standstill.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def wheel_slip(
     wheel_radius_m : float
         Rolling radius [m].
     floor_m_s : float
-        Below this speed of both wheel and car the quotient says nothing [m/s].
+        Below this speed of both wheel and car the slip is 0 [m/s].
 
     Returns
     -------

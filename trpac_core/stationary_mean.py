@@ -1,8 +1,8 @@
 """Means of slip and used friction while a wheel stays at one point of the tyre's curve.
 
-White noise blurs one filtered reading by sigma, and a mean over the time t by about sigma / sqrt(1 + t / (2 tau)), with
-the filter's constant tau. A mean begins anew wherever slip moves: the curve is bent, and a mean over a way along it
-would lie beside it.
+White noise gives one filtered reading the deviation sigma, and a mean over the time t about
+sigma / sqrt(1 + t / (2 tau)), with the filter's constant tau. A mean restarts when slip moves: the curve is bent, and a
+mean along it would lie beside it.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def with_reading(
 def least_slip(mean: StationaryMean, noise: float, noise_s: float) -> float:
     """The slip that the wheel has with significance: that of the mean less what noise and movement may add to it [-].
 
-    On grippy roads force and slip lie on the curve's elastic part, where noise alone decides on which side of its
+    On grippy roads force and slip lie on the adhesion part of the curve, where noise alone decides on which side of its
     end: half of all samples then seem to slide, and to have a theta of little more than the friction they use.
 
     Parameters
@@ -97,5 +97,5 @@ def least_slip(mean: StationaryMean, noise: float, noise_s: float) -> float:
 
 
 def gamma_factor(mean: StationaryMean, noise_s: float) -> float:
-    """How much faster the estimate may follow a mean than a reading, with no more noise left in it [-]."""
+    """Factor by which the estimate may follow a mean faster than a reading at the same noise [-]."""
     return min(1.0 + mean.duration_s / noise_s, GREATEST_GAMMA_FACTOR)

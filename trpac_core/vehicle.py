@@ -1,4 +1,4 @@
-"""What is known of the car: geometry, inertia and the loads on its wheels."""
+"""Description of the car: geometry, inertia and the loads on its wheels."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Vehicle:
 
 @dataclass(frozen=True)
 class CarTolerance:
-    """How well the car is known.
+    """Tolerances of the description of the car.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class CarTolerance:
     ratio : float
         Standard deviation of the rolling radius as a share of it, over load and temperature [-].
     compliance : float
-        Standard deviation of ln(told stiffness / stiffness) of the tyre [-].
+        Standard deviation of ln(described stiffness / stiffness) of the tyre [-].
     """
 
     speed_bias_m_s: float = 0.014
@@ -74,4 +74,4 @@ class CarTolerance:
 
 
 EXACT_CAR = CarTolerance(0.0, 0.0, 0.0)
-"""The car is as it is told."""
+"""The car agrees with its description."""

@@ -44,14 +44,14 @@ LEAST_LOAD = 0.05
 
 @dataclass(frozen=True)
 class WheelSetup:
-    """What the settings make of a wheel.
+    """Constants of a wheel under the settings.
 
     Attributes
     ----------
     wheel : Wheel
         Its constants.
     static_load_n, load_by_acceleration : float
-        Load at rest [N], and what it gains per acceleration [kg].
+        Load at rest [N], and its increase per acceleration [kg].
     setback_m : float
         How far it is behind the front axle [m].
     preview : PreviewConfig
@@ -130,7 +130,7 @@ def first_estimate(config: EstimatorConfig, known: WheelSetup, state: EstimatorS
 
 
 def outcome_of(config: EstimatorConfig, road_class: RoadClass, time_s: float) -> Outcome:
-    """The verdict that a class by bus is, at a time [s]."""
+    """A class by bus as a camera result, at a time [s]."""
     flag = road_class.confidence > config.vision.flag_threshold
     return Outcome(road_class.surface, road_class.confidence, flag, time_s)
 
@@ -138,7 +138,7 @@ def outcome_of(config: EstimatorConfig, road_class: RoadClass, time_s: float) ->
 def unusable_input(
     config: EstimatorConfig, step_s: float, sensors: Sensors, road_class: RoadClass | None
 ) -> Unusable:
-    """What makes readings, or a class by bus, unusable."""
+    """The reason why readings, or a class by bus, are unusable."""
     reason = unusable(step_s, sensors, config.vehicle.wheel_radius_m, config.floor_m_s)
     if reason is Unusable.NOTHING and road_class is not None and not 0.0 <= road_class.confidence <= 1.0:
         return Unusable.CONFIDENCE
@@ -146,12 +146,12 @@ def unusable_input(
 
 
 def rates_of(rates: Rates, config: EstimatorConfig, step_s: float, before_s: float) -> Rates:
-    """What follows from a step's size: as for the step before, if that was as long."""
+    """Values that depend on the step size: those of the step before, if it was as long."""
     return Rates.at(config, step_s, before_s) if step_s != rates.step_s or step_s == 0.0 else rates
 
 
 class Moved(NamedTuple):
-    """How the car moves now."""
+    """Acceleration, lagged speed and load of the car now."""
 
     acceleration_m_s2: float
     lagged_speed_m_s: float
@@ -191,7 +191,7 @@ def stamp(
     seen: Outcome | None,
     speed_m_s: float,
 ) -> None:
-    """Stamp a frame's verdict onto the road ahead; a frame that failed, None, says that it knows nothing."""
+    """Stamp a frame's verdict onto the road ahead; a frame that failed, None, ends the validity of the last one."""
     state.frame_failed = seen is None
     said = seen
     if said is None:
@@ -211,7 +211,7 @@ def stamp(
 
 
 class Frame(NamedTuple):
-    """What a camera gave in a step."""
+    """Result of the camera in a step."""
 
     came: bool
     """Whether it gave anything."""
@@ -260,7 +260,7 @@ def stepped(
             dynamics = settled(dynamics, inputs, known.wheel, gains)
         onset_theta = state.robust.onset_theta
         fused = alone = fusion_step(dynamics, inputs, known.wheel, gains, None, onset_theta, step_s)
-        # A class has one value wherever it is: beside a tyre that has shown this road it says nothing new.
+        # A class has the same value on all its roads: beside a tyre that has shown this road it adds no information.
         unseen_img = theta_img if state.robust.stale else None
         if unseen_img is not None or fusion != dynamics:
             fused = fusion_step(fusion, inputs, known.wheel, gains, unseen_img, onset_theta, step_s)
@@ -420,12 +420,12 @@ def _point(config: EstimatorConfig, state: EstimatorState, fused: float, observe
 
 
 def _under_wheel(state: EstimatorState, known: WheelSetup) -> Outcome | None:
-    """What the camera gave for the road under the wheel."""
+    """Result of the camera for the road under the wheel."""
     return covering(state.preview, known.preview, state.position_m - known.setback_m)
 
 
 class ImageShown(NamedTuple):
-    """What an estimate shows of the camera."""
+    """Camera outputs of an estimate."""
 
     theta: float
     Q_v: float
@@ -435,7 +435,7 @@ class ImageShown(NamedTuple):
 def _image(
     state: EstimatorState, last: Estimate, config: EstimatorConfig, outcome: Outcome | None
 ) -> ImageShown:
-    """What an estimate shows of the camera; where there is no class the last adhesion stays."""
+    """Camera outputs of an estimate; without a class the last adhesion stays."""
     if outcome is None:
         return ImageShown(last.TRPAC_image, Q_v=0.0, age_s=-1.0)
     theta = config.class_theta[outcome.surface]
@@ -443,6 +443,6 @@ def _image(
 
 
 def _source(config: EstimatorConfig, state: EstimatorState, flag: bool, excited: bool) -> Source:
-    """What the estimate rests on; the estimator as printed remembers no road that the tyre has shown."""
+    """The source of the estimate; the method as printed does not remember that the tyre has shown this road."""
     tyre = excited if config.method is Method.AS_PRINTED else not state.robust.stale
     return Source(tyre + 2 * flag)

@@ -141,8 +141,8 @@ class Link:
                 why = f"the interface's driver or package is not installed ({quoted(error)})"
             why = WHY.get(getattr(error, "errno", None) or 0, why).rstrip(".")
             raise HilError(
-                f"{quoted(name)} cannot be opened: {why}. Check --interface, --channel and --bus-option; docs/guide/bus.md "
-                "has examples."
+                f"{quoted(name)} cannot be opened: {why}. Check --interface, --channel, --bus-option; "
+                "docs/guide/bus.md has examples."
             ) from error
 
     @property

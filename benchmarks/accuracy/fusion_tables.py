@@ -1,4 +1,4 @@
-"""All figures of lab/2026-11-29_fusion_over_many_drives.md, of the shipped sweeps that `trpac sweep` has run into folders of one.
+"""All figures of lab/2026-11-29_fusion_over_many_drives.md, from folders of the shipped sweeps.
 
 ``python -m benchmarks.accuracy.fusion_tables out/fusion`` writes their tables between the markers of the page, and the
 pictures beside it. It takes sweeps that are not finished too, and says how many runs each table rests on.

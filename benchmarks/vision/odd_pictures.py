@@ -177,7 +177,9 @@ def table(ife: Ife, count: int = 16) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--models", type=Path, default=ROOT / "models")
-    parser.add_argument("--page", action="store_true", help="write the table into lab/2026-11-29_camera_scores.md")
+    parser.add_argument(
+        "--page", action="store_true", help="write the table into lab/2026-11-29_camera_scores.md"
+    )
     options = parser.parse_args()
     files = options.models / "segmenter.onnx", options.models / "surface.onnx"
     ife = Ife(IfeConfig(groups_looked_at=1), Segmenter(files[0]), SurfaceClassifier(files[1]))

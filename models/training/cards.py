@@ -51,12 +51,13 @@ training was widened for it, so its score is no test score. Real drivable masks 
 """
 SEGMENTER_LIMITS = """\
 - Damp, matt asphalt without reflections is often taken for dry: most of the wet streets that are missed look so.
-- Snow by night is hardly in the data, and not told.
-- A picture as a whole tells of weather and place as much as of the road: where a wet road lies under a blue sky, or
-  snow is cleared, patches know better.
+- Snow by night is hardly in the data, and not found.
+- The whole picture depends on weather and place as much as on the road: where a wet road lies under a blue sky, or
+  snow is cleared, patches are more accurate.
 - No real picture has a shadow label. On real pictures the shadow task learns from painted shadows and that the
-  brighter half of a road and wet roads have none; the darker half stays unknown, lest unlabelled real shadows teach "no
-  shadow". How well it finds real shadows is seen by eye only; dark asphalt and dusk still pass for shadow at times.
+  brighter half of a road and wet roads have none; the darker half stays unknown, so that unlabelled real shadows do
+  not teach "no shadow". How well it finds real shadows was only looked at; dark asphalt and dusk still pass for shadow
+  at times.
 - On rendered pictures much of the shadow is missed, see its IoU; what is called shadow is mostly right.
 - The edge between a snowy road and a snowy verge is a guess."""
 WEATHERED = """\
@@ -64,9 +65,9 @@ Dry pictures of four dash cameras are shown wet and under snow too
 (`models/training/weathered.py`). """
 SURFACE_LIMITS = """\
 - The validation and test stills come from the same kind of web search as the training stills; other cameras are the
-  honest guess for a new car. Wet carries over worst: see its recall on other cameras and how few pictures that is.
+  better estimate for a new car. Wet carries over worst: see its recall on other cameras and how few pictures that is.
 - Real wet and snowy dash frames in training come from one car, one clip each, and the val rows of these clips show the
-  same road seconds later. Rendered scores say how well the network knows the renderer, no more.
+  same road seconds later. Rendered scores only show how well the network knows the renderer.
 - Damp, matt asphalt is labelled nowhere in the data. What is found for it is a guess; expect dry.
 - Night roads with reflected lights and wet cobbles are hardly covered. Gravel, soil and painted surfaces are not.
 - A road unlike those in training may look disturbed to the softening, and is less sure than it could be."""
@@ -337,7 +338,7 @@ precision.
 
 - Input `image`: uint8 (1, 160, 256, 3), BGR, the whole frame reduced by area averaging; normalisation is in the graph.
 - Outputs `drivable` and `shadow`: float32 (1, 160, 256), probabilities. `shadow` means shadow on the road; off the
-  drivable area it says nothing.
+  drivable area it has no meaning.
 - Output `surface`: float32 (1, 3), logits of dry, wet, snow_ice: of mean and deviation of the encoder's maps on the
   road that was found, and of their mean beside it. The class of the picture as a whole, not of a place in it.
 

@@ -128,7 +128,7 @@ def _row(own: Verdicts, flag: NDArray[np.bool_]) -> list[str]:
 
 
 def masks_table(road: Road, pictures: Sequence[Picture], given: argparse.Namespace, steps: Steps) -> str:
-    """IoU of the masks of each source that has some, from decoders that were taught without the source."""
+    """IoU of the masks of each source that has some, from decoders that were trained without the source."""
     training = road.material.training
     families = np.array([shown_family(view.source) for view in training.views])
     rows = []

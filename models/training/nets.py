@@ -65,8 +65,8 @@ class Decoder(nn.Module):
 class RoadNet(nn.Module):
     """Drivable area, road shadow (section 3.1 of Tian et al. 2022) and the road's surface in a whole picture.
 
-    One pretrained encoder at rest, two decoders, and a linear layer on what the encoder makes of the road and of the
-    rest of the picture. General features hold on streets that nothing here has seen.
+    One frozen pretrained encoder, two decoders, and a linear layer on what the encoder makes of the road and of the
+    rest of the picture. General features generalise to streets of sources never seen.
     """
 
     WIDTH, DILATIONS = 128, (1, 2, 4)
@@ -223,7 +223,7 @@ class SurfaceNet(nn.Module):
     DROPOUT = 0.3
     """Share of the pooled features that a step of training leaves out [-]."""
     READING = 64
-    """Width of the head that tells readable road."""
+    """Width of the head for readable road."""
     MOST_DISTURBED = 4.0
     """Limit of the logit that a patch is disturbed, to both sides, beyond which the softening stays as it is."""
 
@@ -272,7 +272,7 @@ class SurfaceNet(nn.Module):
 
 
 def together(nets: Sequence[SurfaceNet], says: Sequence[float]) -> SurfaceNet:
-    """The towers of several nets in one, whose logits are the weighted mean of theirs; other heads are not taught yet.
+    """The towers of several nets in one, whose logits are the weighted mean of theirs; other heads are not trained yet.
 
     Nets that began from unlike trunks err on unlike patches, so the mean is better than each and less sure of what it
     does not know. Source: Lakshminarayanan et al. 2017, Simple and scalable predictive uncertainty estimation.

@@ -15,7 +15,7 @@ from trpac_core.vision.roi_sampling import LEAST_ROAD, MOST_ASPECT, ROI_ASPECT, 
 from .data import SQUASHED, Image, Picture, family_of, pixel_box
 
 CALIBRATION_PER_SOURCE = 240
-"""Most validation patches that one source gives to the calibration, lest one drive decide T."""
+"""Most validation patches of one source in the calibration, so that no single drive decides T."""
 
 ASPECTS = (ROI_ASPECT, MOST_ASPECT)
 """Width over height of a training patch on the road, squeezed to 3:2 in the end: narrow and wide looks [-]."""
@@ -69,7 +69,7 @@ LEAST_ROADS = (0.95, LEAST_ROAD)
 
 CAMERA_SPREAD, RENDERED_SPREAD = 0.4, 0.2
 """Gain, gamma and white balance of other undisturbed cameras, as a share [-]; of rendered ones, whose worlds have drawn
-theirs already: what brightness tells of snow and asphalt is not to be washed out twice."""
+theirs already: the brightness of snow and asphalt must not be changed twice."""
 
 WEB_STRETCH = (1.2, 1.5)
 """Width over height that squared pictures had before, roughly [-]."""

@@ -16,13 +16,13 @@ from rich.progress import (
 )
 
 Report = Callable[[int, float], None]
-"""Is told the step and the loss, which may be NaN."""
+"""Receives the step and the loss, which may be NaN."""
 Steps = Callable[[str, int], AbstractContextManager[Report]]
 """Opens a bar of so many steps."""
 
 
 def bars() -> Progress:
-    """Bars of what is being done, each with what it says of itself."""
+    """Progress bars, each with its own text."""
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -35,7 +35,7 @@ def bars() -> Progress:
 
 @contextmanager
 def steps_of(progress: Progress, description: str, steps: int) -> Iterator[Report]:
-    """A bar of a number of steps; what it gives is told the step and the loss, which may be NaN."""
+    """A bar of a number of steps; it yields a function that receives the step and the loss, which may be NaN."""
     task = progress.add_task(description, total=steps, note="")
     smooth: list[float] = []
 

@@ -54,8 +54,8 @@ STYLED = {(IN_STREETS, LITE0)}
 READING_STEPS = 2000
 OUTLIERS = {"train": 12000, "val": 1600}
 LOOKS, READ_LOOKS = {"": 1500}, {"": 1500, "condition_web": 7500, "rendered": 5500}
-"""Most patches of each source ("" stands for all others) for the head that tells disturbed patches, and for the one
-that tells readable road, which must know many roads."""
+"""Most patches of each source ("" stands for all others) for the head of disturbed patches, and for the head of
+readable road, which must know many roads."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ def _cuts(given: argparse.Namespace, pictures: Sequence[Picture]) -> list[PatchS
 
 
 def learn_heads(net: SurfaceNet, material: Material, seed: int, effort: float) -> None:
-    """Teach the heads that tell readable road and disturbed patches; the rest of the net stays."""
+    """Train the heads for readable road and disturbed patches; the rest of the net is frozen."""
     roads = _looks(material.patches, seed, READ_LOOKS, effort)
     readable = np.concatenate([roads, calibrate.noised(roads, seed + 1)])
     steps = max(2, round(effort * READING_STEPS))
@@ -224,7 +224,7 @@ def learn_heads(net: SurfaceNet, material: Material, seed: int, effort: float) -
 
 
 def _looks(patches: PatchSet, seed: int, most: dict[str, int], effort: float) -> Image:
-    """Undisturbed patches of all sources, at most so many of each: for heads that tell no class."""
+    """Undisturbed patches of all sources, at most so many of each: for heads without classes."""
     rng = np.random.default_rng(seed)
     count = {source: max(8, round(min(effort, 1.0) * looks)) for source, looks in most.items()}
     keep = np.concatenate(

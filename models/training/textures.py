@@ -113,7 +113,7 @@ def ribs(rng: np.random.Generator) -> Image:
 
 
 def plaster(rng: np.random.Generator) -> Image:
-    """Painted plaster, soil, painted metal: what tells it from road is its colour."""
+    """Painted plaster, soil, painted metal: it differs from road in its colour."""
     tone = rng.uniform(0.02, 0.12) * rough(rng, rng.uniform(0.2, 1.2)) + rng.uniform(0.0, 0.15) * rough(
         rng, 1.8
     )

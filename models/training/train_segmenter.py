@@ -1,4 +1,4 @@
-"""Training and scoring of the road network: decoders, and the surface of the road, on what a trunk at rest sees."""
+"""Training and scoring of the road network: decoders and surface head on the features of a frozen trunk."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Encoded:
 
 
 class Encoder:
-    """The pretrained trunk at rest."""
+    """The frozen pretrained trunk."""
 
     def __init__(self, net: RoadNet, threads: int) -> None:
         options = ort.SessionOptions()
@@ -124,9 +124,9 @@ def task_loss(logits: Tensor, labels: Tensor) -> Tensor:
 
 
 def learn_masks(net: RoadNet, seen: Encoded, *, steps: int, seed: int, report: Report) -> RoadNet:
-    """The net with its decoders taught in one learning-rate cycle; `report` gets the step and the loss.
+    """The net with its decoders trained in one learning-rate cycle; `report` gets the step and the loss.
 
-    Views are drawn by `MASK_SHARES`; the trunk is at rest, so that what it makes of them is known.
+    Views are drawn by `MASK_SHARES`; the trunk is frozen, so its features are computed once.
     """
     kinds, drivable, shadow = seen.of("kind"), seen.of("drivable"), seen.of("shadow")
     weights = np.zeros(len(kinds))

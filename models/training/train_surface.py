@@ -23,10 +23,10 @@ TRUNK_RATE, RATE = 1e-3, 2.5e-3
 """Learning rates of what has learned before, and of the rest."""
 WEIGHT_DECAY = 2e-2
 AVERAGING = 0.998
-"""Decay of the running average of the weights; the average is what ships."""
+"""Decay of the running average of the weights; the average is exported."""
 READING_RATE = 2e-3
 DISTURBED_STEPS, DISTURBED_RATE, DISTURBED_DECAY, DISTURBED_DROPOUT = 400, 2e-3, 0.5, 0.5
-"""The head that tells disturbed patches must hold on roads never seen, so it is kept weak."""
+"""Regularisation of the head for disturbed patches, which must generalise to roads never seen."""
 
 
 def new_net(seed: int, kind: Kind = LITE0, *, styled: bool = False) -> SurfaceNet:
@@ -41,7 +41,7 @@ def new_net(seed: int, kind: Kind = LITE0, *, styled: bool = False) -> SurfaceNe
 def learn_classes(
     net: SurfaceNet, patches: PatchSet, *, steps: int, seed: int, device: torch.device, report: Report
 ) -> SurfaceNet:
-    """The net taught the classes in one learning-rate cycle: the running average of its weights, on the processor.
+    """The net after training of the classes in one learning-rate cycle: running average of its weights, on the CPU.
 
     `patches` are drawn by `draw_weights`, each time as another camera sees them.
     """
@@ -113,7 +113,7 @@ def _loss(net: SurfaceNet, looks: Tensor, labels: Tensor) -> Tensor:
 
 
 def learn_reading(net: SurfaceNet, readable: Image, outliers: Image, *, steps: int, seed: int) -> None:
-    """Teach the reading head to tell readable road from all else; the rest of the net stays as it is.
+    """Train the head that separates readable road from all else; the rest of the net is frozen.
 
     `readable` and `outliers` are patches (n, 64, 96, 3); disturbed road counts as readable. `steps` is that of the
     optimiser.
@@ -134,7 +134,7 @@ def learn_reading(net: SurfaceNet, readable: Image, outliers: Image, *, steps: i
 
 
 def learn_disturbed(net: SurfaceNet, clear: Image, disturbed: Image, *, seed: int) -> None:
-    """Teach the head that tells disturbed patches from clear ones; no class is used, the rest of the net stays."""
+    """Train the head for disturbed patches, without classes; the rest of the net is frozen."""
     torch.manual_seed(seed)
     features = torch.cat([embeddings(net, clear), embeddings(net, disturbed)])
     labels = torch.cat([torch.zeros(len(clear)), torch.ones(len(disturbed))])

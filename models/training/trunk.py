@@ -125,7 +125,7 @@ class Trunk(nn.Module):
         return nn.ModuleList([self.stem, *self.blocks[: self.kind.frozen]])
 
     def train(self, mode: bool = True) -> Trunk:
-        """As of any module, but the frozen blocks are always at rest."""
+        """As of any module, but the frozen blocks stay in evaluation mode."""
         super().train(mode)
         self._frozen().eval()
         return self

@@ -60,7 +60,7 @@ GRAIN_PX, GRAIN = 3.0, (0.5, 2.0)
 """Blur without which the road's grain is left [px], and its limits [-]. Nothing is sown that the picture has not got: a
 noise of our own would be learned as the mark of water and snow."""
 REDUCED = 4
-"""Mirrors and halos are reckoned in a picture this much smaller: they are blurred anyway."""
+"""Mirrors and halos are computed in a picture this much smaller: they are blurred anyway."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ are enough of each class."""
 
 @dataclass(frozen=True)
 class Weathered(Picture):
-    """A dry picture shown with another class; what is drawn hangs on `seed`."""
+    """A dry picture shown with another class; the drawing depends on `seed`."""
 
     seed: tuple[int, ...] = ()
 

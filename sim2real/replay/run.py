@@ -89,7 +89,7 @@ class Replay:
     method : Method
         Of ours.
     messages : tuple of str
-        What the drive shows of a car that is not as told.
+        Warnings about a car that differs from its description.
     """
 
     inputs: Inputs

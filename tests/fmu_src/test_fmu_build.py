@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import itertools
 import re
 import subprocess
 import sys
@@ -465,6 +466,20 @@ def test_variable_table_is_current(unit: str) -> None:
     written = variable_table.TARGETS[unit].read_text(encoding="utf-8")
     expected = variable_table.table(unit, UNITS[unit].variables)
     assert written == expected, "run: python -m fmu_src.variable_table"
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_variable_table_has_every_variable_once(unit: str) -> None:
+    names: list[str] = []
+    text = variable_table.table(unit, UNITS[unit].variables)
+    for pattern in re.findall(r"^\| `([^`]+)` \|", text, re.MULTILINE):
+        pieces = re.split(r"\{([^}]*)\}", pattern)
+        names += map("".join, itertools.product(*(piece.split(",") for piece in pieces)))
+    other = UNITS[variable_table.SHARED.get(unit, unit)].variables
+    left_out = {v.name for v in other if v.causality == "parameter"} - set(names)
+    expected = {v.name for v in UNITS[unit].variables}
+    assert len(names) == len(set(names))
+    assert set(names) | (left_out & expected) == expected
 
 
 @pytest.mark.e2e

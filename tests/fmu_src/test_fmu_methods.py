@@ -1,4 +1,4 @@
-"""The units with each method: their outputs are the core's, states resume, a car that is not as told is logged once."""
+"""The units with each method: outputs as of the core, states resume, a wrong description is logged once."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def test_a_wheel_of_another_radius_is_logged_once(open_unit: Open) -> None:
         unit.step(values, step_s=STEP_S)
     about = [line for line in unit.log if "wheel_radius_m" in line.text]
     assert [line.status for line in about] == [WARNING]
-    assert "Front wheels do not have the told radius" in about[0].text
+    assert "Front wheels do not have the expected radius" in about[0].text
 
 
 @pytest.mark.e2e

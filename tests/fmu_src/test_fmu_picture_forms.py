@@ -288,7 +288,7 @@ def test_with_buffers_off_paths_count_as_before(open_unit: Open, tmp_path: Path)
 def test_the_description_tells_of_wrong_addresses(unit_folder: Path) -> None:
     unit = Unit(unit_folder)
     for part in ("base.lo", "base.hi", "size"):
-        assert "An address that cannot be read is a warning" in unit.variables[f"image.{part}"].description
+        assert "An address that cannot be read gives a warning" in unit.variables[f"image.{part}"].description
     unit.free()
 
 

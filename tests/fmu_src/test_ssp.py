@@ -28,6 +28,7 @@ from fmu_src.ssp import (
     SYSTEMS,
     Wiring,
     build_package,
+    build_system,
     parameter_set,
     system_structure,
 )
@@ -125,6 +126,20 @@ def test_missing_units_are_named(tmp_path: Path) -> None:
     with pytest.raises(BuildError, match=r"TorquePulses, ReferencePlant, TrpacEstimator4W"):
         build_package(SYSTEMS["four_wheels"], {}, tmp_path / "x.ssp")
     assert not (tmp_path / "x.ssp").exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("five_wheels",), "'five_wheels' is not a system. Known: four_wheels, one_wheel."),
+        (("one_wheel", "rust"), "kind is 'rust'"),
+    ],
+)
+def test_another_system_or_kind_is_refused(given: tuple[str, ...], said: str, tmp_path: Path) -> None:
+    name, *kind = given
+    with pytest.raises(BuildError, match=said):
+        build_system(name, tmp_path / "dist", *kind)
+    assert not (tmp_path / "dist").exists()
 
 
 def wired_by_hand(

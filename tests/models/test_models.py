@@ -231,7 +231,7 @@ def test_real_stills_are_classified(surface):
 
 @pytest.mark.data
 def test_real_stills_are_classified_by_patches_and_whole():
-    """The same stills by the command: the floor is the lower end of the interval that docs/guide/pictures.md has."""
+    """The same stills by the command: the floor is below the interval in lab/2026-11-29_single_pictures.md."""
     chosen = [p for p in data.of_split(real_pictures(), "test") if p.source == "condition_web"]
     table, refused = classify_pictures([picture.path for picture in chosen])
     assert not refused

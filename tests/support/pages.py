@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 FENCE = re.compile(r'^( *)```(\w*)(?: +title="([^"]*)")?[^\n]*\n(.*?)^\1```$', re.MULTILINE | re.DOTALL)
 BY_HAND, OUTPUT = "by hand: ", "output"
 LANGUAGES = frozenset(
-    ("bash", "c", "cmake", "json", "matlab", "modelica", "powershell", "python", "text", "xml", "yaml")
+    ("bash", "c", "cmake", "json", "lua", "matlab", "modelica", "powershell", "python", "text", "xml", "yaml")
 )
 ABORTED_AFTER_THE_RESULTS = 128 + 6
 """The interpreter's shutdown with the wrapper loaded sometimes aborts: "Limits" in docs/reference/unit.md."""

@@ -15,9 +15,11 @@ import pytest
 from foreign_clients import need_client
 
 import trpac
+from fmu_src.units import UNITS
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
+UNIT_PAGES = DOCS / "guide" / "unit"
 SITE = ROOT / "out" / "site"
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md"), *(ROOT / "models").glob("*.md")])
 RUN = [page for page in DOCUMENTS if page.name != "README.md" and any(b.runs for b in pages.blocks(page))]
@@ -95,6 +97,21 @@ def test_links_lead_somewhere(document: Path) -> None:
         elif anchor and target.suffix == ".md" and anchor not in anchors(target):
             broken.append(f"{link}: no such heading")
     assert not broken
+
+
+def test_the_unit_index_names_every_page() -> None:
+    index = (UNIT_PAGES / "index.md").read_text(encoding="utf-8")
+    others = [page.name for page in UNIT_PAGES.glob("*.md") if page.name != "index.md"]
+    assert [name for name in others if f"]({name})" not in index] == []
+
+
+@pytest.mark.parametrize("page", sorted(UNIT_PAGES.glob("*.md")), ids=named)
+def test_pages_name_variables_that_exist(page: Path) -> None:
+    """A name in code style with a dot that looks like a variable of a unit is one."""
+    known = {variable.name for unit in UNITS.values() for variable in unit.variables}
+    roots = {name.split(".")[0] for name in known if "." in name}
+    said = re.findall(r"`([a-zA-Z_]+\.[a-zA-Z_.0-9]+)`", pages.without_blocks(page))
+    assert {word for word in said if word.split(".")[0] in roots} <= known
 
 
 class Resources(HTMLParser):

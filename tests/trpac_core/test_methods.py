@@ -1,4 +1,4 @@
-"""The three methods of the estimator: bounds on all inputs, state, source, and a car that is not as told."""
+"""The three methods of the estimator: bounds on all inputs, state, source, and a wrong description of the car."""
 
 import json
 import math
@@ -179,7 +179,7 @@ def test_as_printed_it_remembers_no_road():
     assert estimator.step(0.01, CRUISE).source is Source.NONE
 
 
-# A car that is not as told
+# A car that differs from its description
 
 
 def messages_of(seconds=8.0, method=Method.ROBUST, front=True, **drive):
@@ -195,13 +195,13 @@ def test_a_car_as_told_is_not_talked_of(theta, seed):
 
 
 def test_a_tyre_of_another_curve_is_named_with_its_stiffness():
-    """A magic formula of a third of the told slope: 22 kN per unit slip."""
+    """A magic formula of a third of the described slope: 22 kN per unit slip."""
     (about, text), *others = messages_of(curve=6.5, theta=0.3, most=0.1).items()
     assert not others
     assert about == "Front tyres"
-    learnt = float(text.split("learnt ")[1].split(" kN")[0])
+    learnt = float(text.split("estimated ")[1].split(" kN")[0])
     assert learnt == pytest.approx(6.5 * LOAD_N / 1000.0, rel=0.25)
-    assert "told 64 kN (1.27 C_x)" in text
+    assert "expected 64 kN (1.27 C_x)" in text
     assert f"at {LOAD_N / 1000.0:.1f} kN load" in text
     assert "adjust tyre.longitudinal_stiffness_n in vehicle.yaml" in text
 

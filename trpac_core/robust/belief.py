@@ -5,9 +5,9 @@ that predicts the used friction
 
 .. math:: f = \mu_l(\theta_j, \lambda - r;\ C_x e^{-c}) + e .
 
-The road changes with the way driven: a share of the belief goes back to what the camera makes likely. r and c go with
-the tyre, not with the road, so that what goes over takes the mean of the tyre along. The likelihood of a reading counts
-with a power below 1: readings 10 ms apart are not independent, and no model of a tyre is exact.
+The road changes with the distance driven: a share of the probability returns to the prior of the camera. r and c belong
+to the tyre, not to the road, so the probability that returns keeps the mean of the tyre. The likelihood of a reading
+counts with a power below 1: readings 10 ms apart are not independent, and no model of a tyre is exact.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ SLIDING_SHARE = 0.2
 RELAXATION_M = 0.3
 """Way over which a tyre's force follows its slip: car tyres have 0.1 to 0.6 m (Pacejka 2012, ch. 7) [m]."""
 DRIFT = 0.02
-"""How far a tyre's slip offset and softness wander per root of a second, over their standard deviations [1/sqrt(s)]."""
+"""Random walk of slip offset and softness per root of a second, over their standard deviations [1/sqrt(s)]."""
 SOFTER = 0.03
 """Standard deviation that the softness of a tyre of unknown curve gains where the road changes [-]."""
 FORGETTING_1_S = 0.1
@@ -43,12 +43,12 @@ FORGETTING_1_S = 0.1
 LEAST_SLOPE = 0.5
 """Slope of the curve by slip below which it does not count in the normalisation [-]."""
 LEAST_SPEED_M_S, LEAST_RIM_M_S = 1.5, 0.5
-"""Speed below which slip says nothing, and rim speed below which the brake's torque is not the road's [m/s]."""
+"""Speed below which slip is not used, and rim speed below which the brake's torque is not the road's [m/s]."""
 MOST_SLIP = 0.4
 """Slip of a driven wheel above which it spins, and what its tyre loses is not known: to a fifth of the peak by magic
 formulas, hardly any by others [-]."""
 SLIDES = 0.05
-"""Probability that the road is so slippery that the told tyre slides, from which the observer reads theta [-]."""
+"""Probability that the road is so slippery that the described tyre slides, from which the observer reads theta [-]."""
 NEVER = 1e-30
 """Weight that each cell keeps [-]."""
 
@@ -85,11 +85,11 @@ def hypotheses(tyres: tuple[Tyre, ...]) -> Hypotheses:
 
 
 FIRST = hypotheses(TYRES)
-"""Those that a wheel may have."""
+"""The hypotheses that a wheel starts with."""
 
 
 def as_told(tyres: Hypotheses, slip_offset: float, softness: float) -> Hypotheses:
-    """The tyres where the told one has these standard deviations of slip offset and softness [-]."""
+    """The hypotheses, with these standard deviations of slip offset and softness for the described tyre [-]."""
     return Hypotheses(
         tyres.weight,
         np.where(IS_TOLD > 0.0, slip_offset * slip_offset, tyres.offset_variance),
@@ -103,7 +103,7 @@ def as_told(tyres: Hypotheses, slip_offset: float, softness: float) -> Hypothese
 
 @dataclass(frozen=True)
 class Belief:
-    """What is known of road and tyre.
+    """The belief: a probability distribution over road friction and tyre.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ class Belief:
 
 
 def unread(tyres: Hypotheses, prior: PerCell) -> Belief:
-    """The belief before anything was read, with the cells as likely as the prior says, shape (cells,) [-]."""
+    """The belief before anything was read, with the cells as probable as in the prior, shape (cells,) [-]."""
     like = np.zeros((len(tyres.weight), len(prior)))
     return Belief(
         tyres.weight,
@@ -148,7 +148,7 @@ def driven(
     duration_s: float,
     slip_drift: float = 0.0,
 ) -> Belief:
-    """The belief after a way on which the road may have changed.
+    """The belief after a distance on which the road may have changed.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def driven(
 
 @dataclass(frozen=True)
 class WheelModel:
-    """What a wheel is told to be: C_x at a load [N], I [kg m^2], R [m]."""
+    """Description of a wheel: C_x at a load [N], I [kg m^2], R [m]."""
 
     stiffness_n: float
     mean_load_n: float
@@ -204,7 +204,7 @@ class WheelModel:
 
 
 def shows(reading: Reading) -> bool:
-    """Whether the tyre says anything: the car drives, and the wheel neither stands nor spins."""
+    """Whether a reading can be used: the car drives, and the wheel neither stands nor spins."""
     return (
         reading.speed_m_s > LEAST_SPEED_M_S and reading.rim_m_s > LEAST_RIM_M_S and reading.slip < MOST_SLIP
     )
@@ -225,7 +225,7 @@ def read(
     Parameters
     ----------
     belief, tyres, theta, reading, wheel
-        Before; the tyres; the cells; what was read; what the wheel is told to be.
+        Before; the tyres; the cells; what was read; description of the wheel.
     wheel_noise, speed_noise : float
         Variance of a sample of wheel speed [rad^2/s^2] and of vehicle speed [m^2/s^2].
     torque_noise_nm : float
@@ -286,12 +286,12 @@ def read(
 
 
 def told_formula(belief: Belief) -> float:
-    """Probability that the tyre has the told formula [-]."""
+    """Probability that the tyre has the described formula [-]."""
     return float(total(belief.tyre[:FORMULAS])[0])
 
 
 def onset_theta(belief: Belief, theta: PerCell) -> float:
-    """Friction that the road has at most with the probability `SLIDES`, if the tyre is as told [-]."""
+    """Friction that the road has at most with the probability `SLIDES`, if the tyre is as described [-]."""
     up_to = cumulated(belief.road[TOLD])
     return float(theta[min(count_below(up_to, SLIDES), len(theta) - 1)])
 

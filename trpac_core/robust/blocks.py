@@ -78,7 +78,7 @@ def means_of(filling: Filling) -> Means:
 
 
 class Reading(NamedTuple):
-    """What two blocks say of the tyre."""
+    """Slip and used friction of two blocks, with their changes."""
 
     slip: float
     """Signed, positive where it drives [-]."""
@@ -107,7 +107,7 @@ def reading(
     radius_m: float,
     rolling_resistance: float,
 ) -> Reading:
-    """What two blocks in a row say; inertia [kg m^2], radius [m] and rolling resistance [-] of the wheel."""
+    """The reading of two consecutive blocks; inertia [kg m^2], radius [m] and rolling resistance [-] of the wheel."""
     omega = 0.5 * (before.wheel_speed_rad_s + now.wheel_speed_rad_s)
     speed_m_s = 0.5 * (before.vehicle_speed_m_s + now.vehicle_speed_m_s)
     torque_nm, load_n = (

@@ -1,4 +1,4 @@
-"""What a belief says of the road: mean, deviation, and an interval."""
+"""Mean, standard deviation and interval of the road friction under a belief."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ costs more than to miss some [-]."""
 CLIP = 0.025
 """Quantile below which the point value does not go [-]."""
 LOW_SHARE, HIGH_SHARE = 0.14, 0.06
-"""Shares by which the bounds move out: mass, torque and load are not better known, and no driving tells. Below, what
-the tyre carries is the edge of what is possible, and the truth may lie on it [-]."""
+"""Shares by which the bounds move out: mass, torque and load are not better known, and driving does not show them.
+Below, what the tyre carries is the edge of what is possible, and the truth may lie on it [-]."""
 
 
 class Interval(NamedTuple):
@@ -33,7 +33,7 @@ class Interval(NamedTuple):
 
 
 def interval(belief: Belief, theta: PerCell) -> Interval:
-    """What the belief says; a bound lies at the next cell outside of its quantile."""
+    """The interval of a belief; a bound lies at the next cell outside of its quantile."""
     likely = over_rows(belief.road * belief.tyre[:, None])
     up_to = cumulated(likely)
     mean = float(total(likely * theta)[0])

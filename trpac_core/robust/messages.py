@@ -1,4 +1,4 @@
-"""What a drive shows of a car that is not as told, in sentences."""
+"""Warnings, as sentences, about a car that differs from its description."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from .tyres import PEAKS
 from .wheel import RobustSetup, RobustState
 
 LASTING_S = 2.0
-"""Time of readings for which the belief must contradict what is told [s]."""
+"""Time of readings for which the belief must contradict the description of the car [s]."""
 
 
 def learnt_stiffness_n(state: RobustState, known: RobustSetup, load_n: float) -> float | None:
-    """Stiffness of a tyre that does not follow the told formula, at a load [N]; None where it does, or is unread."""
+    """Estimated stiffness of a tyre that does not follow the described formula, at a load [N]; None where it does."""
     if state.doubted_s < LASTING_S:
         return None
     tyre = first_greatest(state.belief.tyre)
@@ -26,7 +26,7 @@ def learnt_stiffness_n(state: RobustState, known: RobustSetup, load_n: float) ->
 
 
 def tyre_message(state: RobustState, known: RobustSetup, axle: str, load_n: float) -> str | None:
-    """Sentences where the tyre does not follow the told formula, else None.
+    """The warning that the tyre does not follow the described formula; None where it does.
 
     `axle` is the first word of the sentences, `load_n` the load at which the stiffness is named [N].
     """
@@ -35,23 +35,23 @@ def tyre_message(state: RobustState, known: RobustSetup, axle: str, load_n: floa
         return None
     told_n = INITIAL_SLOPE * known.wheel.stiffness_n
     return (
-        f"{axle} tyres do not follow the told curve: slip stiffness learnt {1e-3 * learnt_n:.0f} kN per unit slip at "
-        f"{1e-3 * load_n:.1f} kN load, told {1e-3 * told_n:.0f} kN ({INITIAL_SLOPE:g} C_x). TRPAC is an interval here; "
-        "adjust tyre.longitudinal_stiffness_n in vehicle.yaml."
+        f"{axle} tyres do not follow the expected curve: slip stiffness estimated {1e-3 * learnt_n:.0f} kN per unit "
+        f"slip at {1e-3 * load_n:.1f} kN load, expected {1e-3 * told_n:.0f} kN ({INITIAL_SLOPE:g} C_x). Use TRPAC_low "
+        "and TRPAC_high, and adjust tyre.longitudinal_stiffness_n in vehicle.yaml."
     )
 
 
 def learnt_offset(state: RobustState) -> float | None:
-    """Slip of a wheel without force that the told tolerances do not explain [-]; None where they do."""
+    """Slip of a wheel without force that the stated tolerances do not explain [-]; None where they do."""
     return mean_offset(state.belief) if state.offset_s >= LASTING_S else None
 
 
 def radius_message(state: RobustState, known: RobustSetup, axle: str) -> str | None:
-    """Sentences where a wheel without force reads a slip that the told tolerances do not explain; else None."""
+    """The warning that a wheel without force shows a slip beyond the stated tolerances; None where it does not."""
     offset, told_m = learnt_offset(state), known.wheel.radius_m
     if offset is None:
         return None
     return (
-        f"{axle} wheels do not have the told radius: slip without force learnt {100.0 * offset:+.1f} %, as of a radius "
-        f"of {told_m * (1.0 - offset):.4f} m, told {told_m:.4f} m. Adjust wheel_radius_m in vehicle.yaml."
+        f"{axle} wheels do not have the expected radius: slip without force estimated {100.0 * offset:+.1f} %, as of a "
+        f"radius of {told_m * (1.0 - offset):.4f} m, expected {told_m:.4f} m. Adjust wheel_radius_m in vehicle.yaml."
     )

@@ -1,4 +1,4 @@
-"""The cells of road friction, and what the camera's class makes likely before the tyre has shown anything."""
+"""The cells of road friction, and the prior of each class of the camera."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ tyre leaves after half a second of sliding [-]."""
 SLIPPERY, SLIPPERY_SHARE = 0.05, 0.2
 """Roads below this friction are rarer without a camera: wet ice near 0 degrees alone; by this share [-]."""
 CLASS_SCATTER, NEW_SCATTER = 0.13, 0.15
-"""Standard deviation of a road from its class's value: of a class that has stood, and of a new one [-]."""
+"""Standard deviation of a road from its class's value: of a class that has lasted, and of a new one [-]."""
 WRONG_CLASS, NEW_WRONG = 0.1, 0.2
-"""Probability that the class is wrong and says nothing: of one that has stood, and of a new one [-]."""
+"""Probability that the class is wrong and carries no information: of one that has lasted, and of a new one [-]."""
 STOOD_M = 4.0
-"""Way for which the camera gives a class until it has stood: two near groups of the picture [m]."""
+"""Distance after which a class counts as lasting: two near groups of the picture [m]."""
 TURNED, NEW_TURNED = 0.9, 0.36
-"""Share of the belief that goes to the class's prior: where it has stood, and where it is new [-]."""
+"""Share of the belief that moves to the prior of the class: of a lasting class, and of a new one [-]."""
 CHANGE_PER_M = 0.02
-"""Share of the belief that goes back to the prior per way: a road changes about every 50 m [1/m]."""
+"""Share of the belief that returns to the prior per distance: a road changes about every 50 m [1/m]."""
 
 
 def cells() -> Array:
@@ -44,7 +44,7 @@ PerClass = Annotated[Array, (3, len(THETA))]
 
 
 def unseen(theta: PerCell) -> PerCell:
-    """Probability of each cell without a camera, shape (cells,): all frictions alike, the most slippery ones rarer."""
+    """Probability of each cell without a camera, shape (cells,): uniform, with less weight on slippery roads."""
     likely = spacing(theta) * np.where(theta < SLIPPERY, SLIPPERY_SHARE, 1.0)
     return likely / total(likely)
 
@@ -61,7 +61,7 @@ def of_class(theta: PerCell, value: float, greatest: bool, scatter: float, wrong
     greatest : bool
         Whether no class has more: then all frictions above its value are alike.
     scatter, wrong : float
-        Standard deviation of a road from the value, and the probability that the class says nothing [-].
+        Standard deviation of a road from the value, and the probability that the class carries no information [-].
     """
     most, without = math.inf if not greatest else 0.0, unseen(theta)
     off = np.minimum((theta - value) / scatter, most)
@@ -70,12 +70,12 @@ def of_class(theta: PerCell, value: float, greatest: bool, scatter: float, wrong
 
 
 class Priors(NamedTuple):
-    """Probability of each cell by what the camera says."""
+    """Prior probability of each cell by class."""
 
     new: PerClass
     """Of a class that is new, shape (classes, cells)."""
     stood: PerClass
-    """Of one that has stood, shape (classes, cells)."""
+    """Of one that has lasted, shape (classes, cells)."""
     none: PerCell
     """Without one, shape (cells,)."""
 
@@ -109,33 +109,33 @@ NONE = -1
 
 
 class ClassUnderWheel(NamedTuple):
-    """What the camera has said of the road under the wheel."""
+    """Classes that the camera gave for the road under the wheel so far."""
 
     last: int = NONE
     """Class that was given last, or none."""
     way_m: float = 0.0
-    """Way for which it has been given [m]."""
+    """Distance for which it has been given [m]."""
     stood: int = NONE
-    """Class that stood last, or none."""
+    """Class that lasted last, or none."""
     silent_m: float = 0.0
-    """Way since a class was given [m]."""
+    """Distance since a class was given [m]."""
 
 
 class Change(NamedTuple):
     """How sure it is that the road has changed."""
 
     memory: ClassUnderWheel
-    """What the camera has said up to now."""
+    """Classes up to now."""
     share: float
     """Share of the belief that goes to the prior [-]."""
     stood: bool
-    """Whether a class stands from now on that is another one than before."""
+    """Whether a class counts as lasting from now on that is another one than before."""
 
 
 def advanced(memory: ClassUnderWheel, given: int, way_m: float) -> Change:
-    """What the camera has said after a way [m], and what follows for the road.
+    """The classes so far after a distance [m], and the share of the belief that moves.
 
-    `given` is the class under the wheel now, or none. A class that stood is forgotten after `STOOD_M` without any.
+    `given` is the class under the wheel now, or none. A lasting class is forgotten after `STOOD_M` without any.
     """
     share = 1.0 - math.exp(-CHANGE_PER_M * abs(way_m))
     last, driven_m, stood, silent_m = memory
@@ -156,7 +156,7 @@ def advanced(memory: ClassUnderWheel, given: int, way_m: float) -> Change:
 
 
 def prior_of(memory: ClassUnderWheel, given: int, known: Priors) -> PerCell:
-    """Probability of each cell by what the camera says now and has said, shape (cells,) [-]."""
+    """Prior probability of each cell by the class now and the lasting one, shape (cells,) [-]."""
     if given not in (NONE, memory.stood):
         return known.new[given]
     return known.none if memory.stood == NONE else known.stood[memory.stood]

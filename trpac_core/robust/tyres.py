@@ -1,9 +1,10 @@
 """The tyres that a wheel may have, and their curves of used friction over slip.
 
-Nobody knows a tyre's curve. Four hypotheses stand beside each other: the told modified Dugoff tyre, the same with
-another stiffness, and two rational curves that bend from the first slip on. The stiffness of all but the told one goes
-with the load, as that of real tyres does (Pacejka 2012, ch. 4). The two rational curves differ in where their peak lies
-and in what they lose beyond it; magic formulas lie near the first, brush models and exponential curves near the second.
+The curve of a tyre is not known exactly. There are four hypotheses: the described modified Dugoff tyre, the same with
+another stiffness, and two rational curves that bend from the first slip on. The stiffness of all but the first is
+proportional to the load, much as that of real tyres (Pacejka 2012, ch. 4). The two rational curves differ in the
+position of their peak and in what they lose beyond it; magic formulas lie near the first, brush models and exponential
+curves near the second.
 """
 
 from __future__ import annotations
@@ -33,12 +34,12 @@ class Tyre:
     slip_offset : float
         Standard deviation of the slip that a wheel without force reads: radius and speed sensor [-].
     softness : float
-        Standard deviation of ln(told stiffness / stiffness) [-].
+        Standard deviation of ln(described stiffness / stiffness) [-].
     mean_softness : float
-        Mean of it. C_x may be told as the slope at slip 0 or as that over the modified Dugoff tyre's 1.27; exp(0.1)
+        Mean of it. C_x may be stated as the slope at slip 0 or as that over the modified Dugoff tyre's 1.27; exp(0.1)
         lies between [-].
     peak : float
-        Normalised slip C lambda / (theta F_z) of the curve's peak; 0 for the told formula [-].
+        Normalised slip C lambda / (theta F_z) of the curve's peak; 0 for the modified Dugoff tyre [-].
     fall : float
         Share of the bare curve's loss beyond its peak that the tyre has [-].
     """
@@ -52,7 +53,7 @@ class Tyre:
 
 
 TOLD = 0
-"""Which of the tyres is as told, within what is told of the tolerances."""
+"""Index of the tyre that is as described, within the stated tolerances."""
 TYRES = (
     Tyre(0.35, slip_offset=0.003, softness=0.05),
     Tyre(0.15, slip_offset=0.005, softness=0.15),
@@ -62,14 +63,14 @@ TYRES = (
 """The hypotheses. A magic formula of shape factor 1.65 has its peak at 2.15, a brush or TMeasy curve at 3 (Pacejka
 2012, ch. 3 and 4); beyond it steep magic formulas lose to 0.6 at three times the peak's slip, which is `fall` 1."""
 FORMULAS = 2
-"""How many of the tyres, the first ones, have the told formula."""
+"""Number of tyres, the first ones, with the modified Dugoff formula."""
 PerTyre = Annotated[Array, (len(TYRES),)]
 Column = Annotated[Array, (len(TYRES), 1)]
 """One value for each tyre: alone, and beside an axis of cells."""
 Grid = Annotated[Array, (len(TYRES), len(THETA))]
 """One value for each tyre and cell."""
 IS_TOLD = np.array([[float(index == TOLD)] for index in range(len(TYRES))])
-"""1 for the tyre that is as told, else 0."""
+"""1 for the tyre that is as described, else 0."""
 PEAKS = np.array([tyre.peak for tyre in TYRES])
 """`Tyre.peak` of each [-]."""
 
@@ -152,13 +153,13 @@ def curves(
     theta : array, shape (cells,)
         Peak friction [-].
     slip, softness : array, shape (tyres, cells)
-        Signed slip, positive where it drives, and ln(told stiffness / stiffness) [-].
+        Signed slip, positive where it drives, and ln(described stiffness / stiffness) [-].
     load_n, stiffness_n, mean_load_n : float
-        Load, told C_x, and the load that it is told for [N].
+        Load, described C_x, and the load for which it holds [N].
     peak, fall : array, shape (tyres, 1)
         As in `Tyre` [-].
     """
-    # C_x is told at the mean load; a tyre that is not as told has a stiffness that goes with the load.
+    # C_x holds at the mean load; the stiffness of all but the described tyre is proportional to the load.
     by_load = np.where(IS_TOLD[:FORMULAS] > 0.0, 1.0, load_n / mean_load_n)
     told_n = stiffness_n * exp(-softness[:FORMULAS]) * by_load
     told = dugoff(theta, size(slip[:FORMULAS]), load_n, told_n)

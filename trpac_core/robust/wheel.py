@@ -34,20 +34,20 @@ from .roads import STOOD_M, THETA, ClassUnderWheel, PerCell, Priors, advanced, p
 from .tyres import TOLD
 
 BELIEVED = 0.2
-"""Probability of the told formula from which the tyre is taken to be as told [-]."""
+"""Probability of the described formula from which the tyre is taken to be as described [-]."""
 LEAST_TOLERANCE = 1e-4
-"""Tolerance of radius and stiffness below which they are not taken: a filter divides by what it does not know [-]."""
+"""Smallest tolerance of radius and stiffness that is used: the filter divides by it [-]."""
 LEAST_USED_SHARE = 0.1
-"""Share of TRPAC below which the used friction does not tell one tyre from another [-]."""
+"""Share of TRPAC below which the used friction does not distinguish the tyres [-]."""
 OFFSET_DEVIATIONS = 2.0
-"""Told standard deviations beyond which the slip offset contradicts what is told [-]."""
+"""Stated standard deviations beyond which the slip offset contradicts the description [-]."""
 SCALE_DEVIATION = 0.04
 """Standard deviation of TRPAC by mass, torque and load, as a share of it [-]."""
 
 
 @dataclass(frozen=True)
 class RobustSetup:
-    """What stays as it is while the wheel drives.
+    """Constants of the robust estimator of a wheel.
 
     Attributes
     ----------
@@ -56,9 +56,9 @@ class RobustSetup:
     known : Priors
         By the camera's class.
     tyres : Hypotheses
-        What the tyre may be.
+        Hypotheses about the tyre.
     wheel : WheelModel
-        What the wheel is told to be.
+        Description of the wheel.
     rolling_resistance : float
         [-].
     wheel_noise, speed_noise : float
@@ -88,7 +88,7 @@ def setup(
     tolerance: CarTolerance,
     class_theta: tuple[float, float, float],
 ) -> RobustSetup:
-    """The set-up of a wheel; the told noise of the sliding speed [m/s] is shared evenly by its two sensors."""
+    """The set-up of a wheel; the stated noise of the sliding speed [m/s] is shared evenly by its two sensors."""
     half = 0.5 * sliding_speed_noise_m_s * sliding_speed_noise_m_s
     return RobustSetup(
         THETA,
@@ -104,34 +104,34 @@ def setup(
 
 
 class RobustState(NamedTuple):
-    """What the robust estimator remembers.
+    """State of the robust estimator.
 
     Attributes
     ----------
     belief : Belief
         About road and tyre.
     said : Interval
-        What it says of the road.
+        Interval of the road friction.
     memory : ClassUnderWheel
-        What the camera has said.
+        Classes of the camera so far.
     filling, before : Filling, Means or None
         The block that fills, and the one before it.
     friction : float
         Used friction that was read last, 0 before any [-].
     onset_theta : float
-        Friction that the road has at most with the probability `belief.SLIDES`, if the tyre is as told [-].
+        Friction that the road has at most with the probability `belief.SLIDES`, if the tyre is as described [-].
     slowness_s_m : float
         One over the speed of the last reading, 0 before any [s/m].
     way_m : float
-        Way since the last block was full [m].
+        Distance since the last block was full [m].
     wheel_noise, speed_noise : Noise
         Of the readings.
     unread_m : float
-        Way since the observer last read the road [m].
+        Distance since the observer last read the road [m].
     stale : bool
         Whether the camera has since found another road.
     doubted_s, offset_s : float
-        Time of readings since which the told formula, and the told tolerance of the radius, are not believed [s].
+        Time of readings for which the described formula, and the stated radius, have been improbable [s].
     """
 
     belief: Belief
@@ -228,7 +228,7 @@ def stepped(
     given : int
         Class that the camera gives the road under the wheel, or `roads.NONE`.
     step_s, way_m : float
-        Step [s] and way over it [m].
+        Step [s] and distance over it [m].
     observed : bool
         Whether the observer reads the road in this step.
     """
@@ -336,7 +336,7 @@ def _on_road(
 
 
 def _offset_is_strange(belief: Belief, known: RobustSetup, slowness_s_m: float) -> bool:
-    """Whether the slip offset lies beyond what radius and speed bias are told to make of it."""
+    """Whether the slip offset lies beyond the stated tolerances of radius and speed."""
     by_speed, offset = known.speed_bias_m_s * slowness_s_m, mean_offset(belief)
     told = known.tyres.offset_variance[TOLD, 0] + by_speed * by_speed
     return bool(offset * offset > OFFSET_DEVIATIONS * OFFSET_DEVIATIONS * told)
@@ -349,7 +349,7 @@ def point(state: RobustState, observer: float) -> float:
 
 
 class Claim(NamedTuple):
-    """What the belief says of an estimate [-]."""
+    """Standard deviation and bounds of an estimate under the belief [-]."""
 
     deviation: float
     low: float

@@ -1,1 +1,1 @@
-"""The camera side: what the pictures say of the road ahead."""
+"""The camera side: surface class of the road ahead from pictures."""

@@ -1,4 +1,4 @@
-"""The road surfaces that the camera side tells apart."""
+"""Surface classes of the camera side."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Many patches, one verdict: the improved Dempster-Shafer fusion of Eqs. (7) to (10)."""
+"""The improved Dempster-Shafer fusion of patches, Eqs. (7) to (10)."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class WeightLaw:
     """Parameters of the weight update, Eq. (9); the defaults of the sigmoid are the printed form.
 
     Printed, the sigmoid of a number in [0, 1] lies in [0.5, 0.73], so that the weights stay within [0.29,
-    0.42]: history tips a close vote and no more. A steeper slope around a centre of 1/3 gives history more
-    say.
+    0.42]: history decides close votes only. A steeper slope around a centre of 1/3 gives history more
+    weight.
     """
 
     sigma: float = 0.5
@@ -72,7 +72,7 @@ def basic_probability(
     weights : tuple of 3 floats
         Evidence weights [-].
     say : array, shape (n,), optional
-        How much road each patch stands for; as printed, as much as any other [-].
+        Weight of each patch; as printed all are equal [-].
 
     Returns
     -------

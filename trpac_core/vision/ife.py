@@ -1,4 +1,4 @@
-"""The image-based fusion estimator (IFE): a picture and the car's motion in, surface and confidence out."""
+"""The image-based fusion estimator (IFE): surface class and confidence from a picture and the motion of the car."""
 
 from __future__ import annotations
 
@@ -52,18 +52,18 @@ BEFORE_NEAR_M, HIDDEN_M = 0.5, 0.3
 one that was seen before [m]."""
 
 PICTURE_SAY = 0.5
-"""How much the logits of the picture as a whole count beside those of a patch in it [-]."""
+"""Weight of the logits of the whole picture beside those of a patch [-]."""
 
 PATCHES_AHEAD = 6
-"""Patches of a look that is remembered [-]."""
+"""Number of remembered patches per frame [-]."""
 
 
 @dataclass(frozen=True)
 class IfeState:
-    """What the estimator remembers: evidence weights per group, frames seen, looks at road that was not near yet.
+    """State of the estimator: evidence weights per group, number of frames, remembered patches of road ahead (looks).
 
-    `lines_m` are ways of the front wheels at lines across the road, and `passed` ends at one: what all of the road
-    before it tells.
+    `lines_m` are distances driven by the front wheels at lines across the road; `passed` has the class probabilities
+    at the end of the road passed.
     """
 
     evidence: tuple[EvidenceState, ...] = (EvidenceState(),) * len(GROUP_NAMES)
@@ -73,7 +73,7 @@ class IfeState:
     passed: Passed | None = None
 
     def elsewhere(self) -> IfeState:
-        """The state of a car that may be anywhere by now: no road ahead is known, nor what led to it."""
+        """The state after the position was lost: no road ahead or passed is known."""
         return replace(self, looks=(), lines_m=(), passed=None)
 
     def to_json(self) -> dict[str, Any]:
@@ -96,7 +96,7 @@ class IfeState:
 
 
 class Ife:
-    """The estimator with its networks; the state goes in and comes out, nothing is remembered inside."""
+    """The estimator with its networks; it stores nothing, all memory is in the state."""
 
     def __init__(self, config: IfeConfig, segmenter: RoadSegmenter, classifier: PatchClassifier) -> None:
         self.config = config
@@ -117,7 +117,7 @@ class Ife:
         masks: RoadMasks | None = None,
         with_view: bool = False,
     ) -> tuple[IfeState, FrameResult]:
-        """One frame.
+        """The state and the result after one frame.
 
         Parameters
         ----------
@@ -130,7 +130,7 @@ class Ife:
         masks : RoadMasks, optional
             Of this picture, where several estimators share it (left and right wheels).
         with_view : bool
-            Whether the result also says where in the picture it looked.
+            Whether the result also has the regions and masks, for drawing.
 
         Returns
         -------
@@ -183,7 +183,7 @@ class Ife:
         return [region.seen_in(image) for region in regions]
 
     def judge(self, state: IfeState, motion: Motion, regions: list[Region]) -> tuple[IfeState, FrameResult]:
-        """The state after a frame and its verdict, from the classified regions of `look`."""
+        """The state and the result after a frame, from the classified regions of `look`."""
         looks, passed = self._remembered(state, motion, regions[-1])
         verdicts = [
             self._fuse(
@@ -200,13 +200,13 @@ class Ife:
         return IfeState(after, state.frame_count + 1, looks, lines_m, passed), result
 
     def _remembers(self, state: IfeState, motion: Motion) -> bool:
-        """Whether what the lane ahead shows in this frame is to be remembered."""
+        """Whether patches of the lane ahead are remembered from this frame."""
         return self.config.use_foresight and motion.way_m is not None and due(state.looks, motion.way_m)
 
     def _remembered(
         self, state: IfeState, motion: Motion, last: Region
     ) -> tuple[tuple[Look, ...], Passed | None]:
-        """The looks that still have a say, with this frame's (`last`) where it is to be remembered; the road before."""
+        """The looks that still count, with that of this frame (`last`) if it is remembered; the road passed."""
         at_m = motion.way_m
         if at_m is None or not self.config.use_foresight:
             return (), None
@@ -220,7 +220,7 @@ class Ife:
 
     @property
     def _reach_m(self) -> tuple[float, float]:
-        """Where remembered patches have a say [m]."""
+        """Range in which remembered patches count [m]."""
         return self.config.ranges_m[0][0] - BEHIND_M, self.config.ranges_m[1][1]
 
     def _along_the_road(
@@ -358,7 +358,7 @@ class Ife:
     ) -> tuple[EvidenceState, GroupResult]:
         """Evidence weights and verdict of one group, Eqs. (7) to (10).
 
-        Patches that were seen before have their say in the weights and the mass, but Eq. (7) combines no more bodies
+        Patches that were seen before count in the weights and the mass, but Eq. (7) combines no more bodies
         of evidence for them: they show the same road again. Where a line parts the group its ground decides, not the
         weights, which know the surface up to the line.
         """

@@ -16,7 +16,7 @@ SIDES = {"left": (1.0,), "right": (-1.0,), "both": (1.0, -1.0)}
 MOST_WAY_M, MOST_WIDTH_M, MOST_PATCHES = 200.0, 40.0, 500
 LEAST_GRID_M, LEAST_STEP_M = 0.005, 0.01
 MOST_DEVIATION_M, MOST_GROWTH_M_S = 2.0, 0.01
-"""Beyond these a frame would cost minutes or all memory, and nothing would be gained [m], [m/s]."""
+"""Limits beyond which a frame would cost minutes or all memory [m], [m/s]."""
 STEEPEST_SIGMOID, FARTHEST_CENTRE = 100.0, 1.0
 """A steeper sigmoid, or one centred beyond what shares can be, gives all classes the same weight, or none any [-]."""
 
@@ -34,8 +34,8 @@ class IfeConfig:
     side : {'left', 'right', 'both'}
         Front wheels whose tracks are looked at.
     ranges_m : tuple of 3 pairs
-        Ways of the rear axle over which the wheels' near, middle and far group lie; the first starts at the preview
-        distance [m].
+        Distances driven by the rear axle over which the near, middle and far group lie; the first starts at the
+        preview distance [m].
     a_m : float
         Grid size a [m].
     b : tuple of 3 ints
@@ -62,7 +62,7 @@ class IfeConfig:
         Of the drawing of patches.
     groups_looked_at : int
         How many groups from the near one on have a verdict. The frame's is the near group's, so 1 gives the same in
-        less time, bit by bit; the others are for those who look at the road further ahead.
+        less time, bit by bit; the others are for users of the road further ahead.
     use_trajectory, remove_shadow, calibrate, weight_evidence, use_scene, use_foresight, use_lines : bool
         Each False leaves that part of the method out, to measure what it is worth: the whole drivable strip
         ahead in place of the ellipses; shadow kept; T = 1; equal evidence weights in Eq. (8); patches judged

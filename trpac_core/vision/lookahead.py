@@ -1,7 +1,7 @@
-"""Road seen before it is near: patches from the middle group's range have their say when their ground is near.
+"""Memory of road seen ahead: patches from the range of the middle group count again when their ground is near.
 
-Water shows in what it mirrors, and the flatter the look, the more it mirrors: from 6 m a wet road is told from a dry
-one more surely than from 3 m. The way driven says where the ground of an earlier look is by now.
+Water shows in its reflections, which are stronger at a flat angle: a wet road is distinguished from a dry one better
+at 6 m than at 3 m. The distance driven gives the present position of a remembered patch.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from .classes import Surface
 from .surface_hmm import Passed, passed_by
 
 LOOK_EVERY_M = 0.4
-"""Way between the looks that are remembered: closer ones show the same, and a car that stands must not add any [m]."""
+"""Distance between remembered frames: closer ones show the same road, and a standing car must not add any [m]."""
 
 BEHIND_M = 2.0
-"""Road nearer than the near group of which a remembered patch still has a say [m]."""
+"""Road nearer than the near group on which a remembered patch still counts [m]."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """What one frame showed of road that was not near yet.
+    """Patches of one frame on road that was not near yet (a look).
 
     Attributes
     ----------
     at_m : float
-        Way of the front wheels at the frame [m].
+        Distance driven by the front wheels at the frame [m].
     ways_m : tuple of n floats
-        Way at which the front wheels reach each patch [m].
+        Distance driven at which the front wheels reach each patch [m].
     probabilities : tuple of n triples
         Calibrated probabilities of dry, wet, snow and ice [-].
     """
@@ -59,14 +59,14 @@ class Look:
 
 
 def due(looks: Sequence[Look], at_m: float) -> bool:
-    """Whether a frame at a way is far enough from all that are remembered to be remembered too."""
+    """Whether a frame at a distance driven is far enough from all remembered ones to be remembered."""
     return all(abs(look.at_m - at_m) >= LOOK_EVERY_M for look in looks)
 
 
 def recalled(
     looks: Sequence[Look], at_m: float, reach_m: tuple[float, float]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How far ahead of the front wheels the remembered patches lie that are within [from, to) now, and what they show.
+    """Positions ahead of the front wheels and probabilities of the remembered patches within [from, to) now.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def recalled(
 
 
 def within_reach(looks: Sequence[Look], at_m: float, reach_m: tuple[float, float]) -> tuple[Look, ...]:
-    """The looks of which a patch lies in [from, to) ahead of the front wheels now: the others have no say."""
+    """The looks of which a patch lies in [from, to) ahead of the front wheels now: the others do not count."""
     low, high = reach_m
     return tuple(look for look in looks if any(low <= way_m - at_m < high for way_m in look.ways_m))
 
@@ -100,20 +100,20 @@ def road_passed(
     end_m: float,
     near_m: float,
 ) -> Passed | None:
-    """All of the road that has no patches of its own any more, at a way of the front wheels.
+    """Class probabilities at the end of the road whose patches are no longer stored.
 
     Parameters
     ----------
     passed : Passed, optional
-        As far as it went a frame before.
+        As of the frame before.
     looks : sequence of Look
-        Remembered since: those of their patches that are passed now are taken up.
+        Remembered since: those of their patches that are passed now are included.
     lines_m : sequence of float
-        Ways at lines across the road [m].
+        Distances driven at lines across the road [m].
     at_m : float
-        Way now [m].
+        Distance driven now [m].
     end_m, near_m : float
-        How far ahead patches begin to have a say of their own, and the near group begins [m].
+        How far ahead patches begin to count themselves, and the near group begins [m].
 
     Returns
     -------

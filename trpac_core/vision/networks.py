@@ -1,4 +1,4 @@
-"""The networks behind the camera side: the road in a picture and what it looks like, and the surface of patches."""
+"""The networks of the camera side: road masks and surface of a picture, and surface of patches."""
 
 from __future__ import annotations
 
@@ -47,15 +47,14 @@ class ModelError(TrpacError):
 
 @dataclass(frozen=True)
 class RoadMasks:
-    """Where the road is in a picture, and what it looks like as a whole.
+    """Masks of the road in a picture, and surface logits of the whole picture.
 
     Attributes
     ----------
     drivable, shadow : float32, shape (160, 256)
         Probabilities at the network's resolution [-].
     surface : float64, shape (3,)
-        Logits of dry, wet, snow and ice, of the road in its surroundings: what patches leave out. All alike where
-        nothing is known.
+        Logits of dry, wet, snow and ice of the road in its surroundings; equal where nothing is known.
     """
 
     drivable: NDArray[np.float32]
@@ -65,7 +64,7 @@ class RoadMasks:
 
 @dataclass(frozen=True)
 class PatchVerdicts:
-    """What the surface network says of n patches.
+    """Output of the surface network for n patches.
 
     Attributes
     ----------
@@ -80,7 +79,7 @@ class PatchVerdicts:
 
 
 class RoadSegmenter(Protocol):
-    """Finds drivable road and shadow in a picture, and says what the road looks like."""
+    """Computes masks of drivable road and shadow, and the surface logits of the whole picture."""
 
     def segment(self, image: NDArray[np.uint8]) -> RoadMasks:
         """Masks and surface of a BGR picture of any size."""
@@ -88,7 +87,7 @@ class RoadSegmenter(Protocol):
 
 
 class PatchClassifier(Protocol):
-    """Tells the surface of road patches."""
+    """Classifies the surface of road patches."""
 
     @property
     def temperature(self) -> float:
@@ -96,7 +95,7 @@ class PatchClassifier(Protocol):
         ...
 
     def verdicts(self, patches: NDArray[np.uint8]) -> PatchVerdicts:
-        """What BGR patches (n, 64, 96, 3) show by themselves."""
+        """Logits and readability of BGR patches (n, 64, 96, 3)."""
         ...
 
 

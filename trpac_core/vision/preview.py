@@ -2,17 +2,17 @@
 
 Positions are the front wheel's odometric coordinate X, the integral of the vehicle's speed [m].
 
-A frame taken at X = P_1 speaks of the road from X_lb = P_1 + P_0 on. Eq. (11) writes X_lb from the position
-P_2 when the frame has been processed, less the way driven meanwhile, which is the same place. X_ub lies one
+A frame taken at X = P_1 applies to the road from X_lb = P_1 + P_0 on. Eq. (11) writes X_lb from the position
+P_2 when the frame has been processed, less the distance driven meanwhile, which is the same place. X_ub lies one
 frame interval's way further, so that successive frames tile the road. Real frames come late or not at all, so
 the tiling is read as:
 
-* A stamp's length is the way driven since the frame before; for the first frame, speed times frame interval.
+* A stamp's length is the distance driven since the frame before; for the first frame, speed times frame interval.
 * A result holds from its X_lb until the X_lb of the next frame, at most `hold_m` beyond its X_ub; then there is a
   gap: no result. The default is the depth of the near group, the stretch of road that the result was taken from.
 * Where several stamps cover a position, the newest frame wins.
-* Frames less than `resolution_m` apart share one stamp, with the newest result: a car that stands, or shunts to and
-  fro, does not pile up stamps. Of more than `MOST_STAMPS` the oldest goes.
+* Frames less than `resolution_m` apart share one stamp, with the newest result: a standing or shunting car
+  does not collect stamps. Of more than `MOST_STAMPS` the oldest goes.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ MOST_STAMPS = 512
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a frame, or a classifier elsewhere on the bus, says of the road ahead."""
+    """Class of the road ahead from a frame, or from a classifier elsewhere on the bus."""
 
     surface: Surface
     Q_v: float
@@ -58,7 +58,7 @@ class PreviewConfig:
     hold_m : float
         How far beyond its X_ub a result holds when no newer one begins [m].
     resolution_m : float
-        Way below which two frames share a stamp [m].
+        Distance below which two frames share a stamp [m].
     behind_m : float
         How far behind the front wheel stamps are kept: the wheelbase where rear wheels ask too [m].
     """

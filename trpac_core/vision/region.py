@@ -1,4 +1,4 @@
-"""One group of road ahead: its ground, the patches drawn from it, and how much ground each of them stands for."""
+"""One group of road ahead: its ground, its patches, and the share of ground that each patch represents."""
 
 from __future__ import annotations
 
@@ -26,30 +26,30 @@ from .trajectory import Ellipses, way_beside
 
 LEAST_CONTRAST = 1.0
 """Standard deviation of a patch's grey levels below which it shows no road but a covered, blinded or dark camera. The
-lowest of disturbed rendered road was 3.1, of real road 1.9 [8-bit levels]."""
+lowest value of disturbed rendered road was 3.1, of real road 1.9 [8-bit levels]."""
 
 BODIES_OF_SECTION = 10
 """Bodies of evidence as which Eq. (7) combines the patches on one side of a line, so that each side is as sure [-]."""
 
 CORNERS_THINNED = 20
-"""One of so many corners tells how much ground lies between two lines [-]."""
+"""One of so many corners is used to measure the ground between two lines [-]."""
 
 Lines = tuple[NDArray[np.float64], NDArray[np.float64]]
-"""Where lines cross the road, and where something looked like one for the first time: see `Way` [m]."""
+"""Positions of lines across the road, and of candidates seen for the first time: see `Way` [m]."""
 
 
 @dataclass(frozen=True)
 class Way:
-    """The wheels' way, and the lines that cross it.
+    """The path of the wheels, and the lines that cross it.
 
     Attributes
     ----------
     tracks : tuple of Ellipses
-        Of the wheels; without any, the way leads straight ahead.
+        Of the wheels; without any, the path is straight.
     lines_m : array, shape (n,)
         Where lines cross the road, ascending [m].
     doubtful_m : array, shape (m,)
-        Where something looked like one for the first time [m].
+        Candidates that were seen for the first time [m].
     """
 
     tracks: tuple[Ellipses, ...]
@@ -57,15 +57,15 @@ class Way:
     doubtful_m: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
     def lines_from(self, way_m: float | None) -> tuple[float, ...]:
-        """All lines as ways of the front wheels, which have come so far; none where that is not known [m]."""
+        """All lines as distances driven by the front wheels; none where the distance so far is unknown [m]."""
         return () if way_m is None else tuple((way_m + np.append(self.lines_m, self.doubtful_m)).tolist())
 
     def to(self, ground_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How far along the way ground points lie, shape (n,) [m]."""
+        """Distance along the path of ground points, shape (n,) [m]."""
         return way_beside(self.tracks, ground_m) if self.tracks and len(ground_m) else ground_m[:, 0]
 
     def section(self, places_m: NDArray[np.float64]) -> NDArray[np.intp]:
-        """How many lines lie before each place on the way, shape (n,)."""
+        """Number of lines before each place on the path, shape (n,)."""
         return np.searchsorted(self.lines_m, places_m, side="right")
 
     def rows_of_ends_px(self, ground_m: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
@@ -84,14 +84,14 @@ class Way:
 
 @dataclass(frozen=True)
 class Heard:
-    """What has a say in a group's verdict.
+    """Patches that count for the class of a group, with their weights.
 
     Attributes
     ----------
     probabilities : array, shape (n, 3)
         Of the group's own patches, and of those of its ground that were seen before [-].
     say : array, shape (n,)
-        How much road each stands for: see `Region.say`.
+        Weight of each: see `Region.say`.
     parted : bool
         Whether a line lies between them.
     """
@@ -103,7 +103,7 @@ class Heard:
 
 @dataclass(frozen=True)
 class Region:
-    """One group on its way: its corners, the patches drawn from them, and what those that can be read show.
+    """One group on its path: its corners, the patches drawn from them, and the probabilities of the readable ones.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class Region:
     boxes : array of int, shape (n, 4)
         Of those left: left, top, right, bottom [px].
     ahead_m : array, shape (n,)
-        Where the middle of each lies on the way [m].
+        Position of the middle of each on the path [m].
     patches : tuple of n arrays of uint8, shape (64, 96, 3)
         BGR.
     probabilities : array, shape (n, 3)
@@ -145,9 +145,9 @@ class Region:
         camera: Camera,
         drivable: NDArray[np.bool_],
     ) -> Region:
-        """A region with patches of these widths, each on its side of the way's lines.
+        """A region with patches of these widths, each on its side of the lines.
 
-        Around as many of the corners drawn, those whose patches show most drivable road: kerbs and cars are no surface.
+        Of the corners drawn, those are taken whose patches show most drivable road.
         """
         ground_m = corners.ground_m[drawn]
         widths_px = roi_widths_px(camera, ground_m, np.resize(widths_m, len(drawn)))
@@ -175,10 +175,10 @@ class Region:
 
     @property
     def p_util(self) -> float:
-        """Share of the road looked at that is of use [-]: corners that are usable, times patches that can be read.
+        """Usable share of the road [-]: share of usable corners times share of readable patches.
 
-        The paper's is the first alone; the second takes covered lenses, walls and night skies below the flag's gate:
-        `lab/2026-11-29_camera_scores.md` tells what it holds back.
+        The paper has the first factor only; the second clears the flag for covered lenses, walls and night skies
+        (`lab/2026-11-29_camera_scores.md` has the figures).
         """
         read = len(self.probabilities) / self.drawn if self.drawn else 1.0
         return self.corners.p_util * read
@@ -186,7 +186,7 @@ class Region:
     def heard(
         self, places_m: NDArray[np.float64], probabilities: NDArray[np.float64], inside: NDArray[np.bool_]
     ) -> Heard:
-        """What of these patches, the region's own first, has a say in its verdict; arguments as of `say`."""
+        """Those of these patches, the region's own first, that count for its class; arguments as of `say`."""
         say = self.say(places_m, inside)
         parted = len(np.unique(self.way.section(places_m[say > 0.0]))) > 1
         if parted:
@@ -195,19 +195,19 @@ class Region:
         return Heard(probabilities[kept], say[kept], parted)
 
     def say(self, places_m: NDArray[np.float64], inside: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """How much of the group's ground each patch stands for: those on one side of a line share what lies there.
+        """Weight of each patch: the patches on one side of a line share the ground on that side.
 
         Parameters
         ----------
         places_m : array, shape (n,)
-            Where patches lie on the way, the region's own first [m].
+            Positions of the patches on the path, the region's own first [m].
         inside : array of bool, shape (n,)
             Which of them count as the group's. Where none lies on a side, the closest to the line does.
 
         Returns
         -------
         array, shape (n,)
-            In corners, 0 where a patch has no say; 1 for each of the group's where no line crosses the way [-].
+            In corners; 0 for a patch that does not count, 1 for each of the group's without a line [-].
         """
         if not len(self.way.lines_m):
             return inside.astype(np.float64)
@@ -227,14 +227,14 @@ class Region:
     def by_section(
         self, places_m: NDArray[np.float64], probabilities: NDArray[np.float64], say: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """What each patch shows, combined with those heard on its side of a line.
+        """Probabilities of each patch, combined with those that count on its side of a line.
 
-        Half the ground is to weigh as half the ground, also where one of two surfaces is told less surely.
+        Half of the ground weighs half, also where one of two surfaces is classified with less confidence.
 
         Parameters
         ----------
         places_m, probabilities : array, shapes (n,), (n, 3)
-            Where patches lie on the way [m], and what they show [-].
+            Positions of the patches on the path [m], and their probabilities [-].
         say : array, shape (n,)
             See `say`.
 

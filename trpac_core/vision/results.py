@@ -1,4 +1,4 @@
-"""What the image-based fusion estimator says of a frame."""
+"""Results of the image-based fusion estimator for a frame."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .networks import RoadMasks
 
 @dataclass(frozen=True)
 class GroupResult:
-    """Verdict of one group of ellipses.
+    """Result of one group of ellipses.
 
     `probabilities` are P_fusion of dry, wet, snow and ice, `m_0` is the largest mass of Eq. (8) before the
     combination. With `n_roi` of 0 or 1 they are the evidence weights, `m_0` is 0, the surface is that of the largest
@@ -55,7 +55,7 @@ class GroupView:
 
 @dataclass(frozen=True)
 class FrameView:
-    """What was looked at in a frame, for a person to see.
+    """Regions and masks of a frame, for drawing.
 
     `usable` is the mask of road out of the shadow, `lines_px` the ends of the lines across the road, shape (n, 2, 2);
     NaN where they are not ahead of the lens [px].
@@ -69,7 +69,7 @@ class FrameView:
 
 @dataclass(frozen=True)
 class FrameResult:
-    """Verdict of a frame: that of its near group, since the paper updates frame by frame (section 3.4)."""
+    """Result of a frame: that of its near group, since the paper updates frame by frame (section 3.4)."""
 
     groups: tuple[GroupResult, ...]
     frame: int
@@ -97,7 +97,7 @@ class FrameResult:
 
     @property
     def p_util(self) -> float:
-        """Share of the looked-at road that is of use [-]."""
+        """Usable share of the road that is looked at [-]."""
         return self.near.p_util
 
     @property
@@ -111,5 +111,5 @@ class FrameResult:
         return self.near.flag
 
     def told_by_bus(self, flag_threshold: float) -> float:
-        """Q_v for a receiver that sets its flag by Q_v alone: no more than its threshold where the flag is down [-]."""
+        """Q_v for a receiver that sets its flag by Q_v alone: at most its threshold where the flag is 0 [-]."""
         return self.Q_v if self.flag else min(self.Q_v, flag_threshold)

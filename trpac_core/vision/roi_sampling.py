@@ -1,4 +1,4 @@
-"""Which patches of road are looked at: corners in the ellipses, shadow removal, sampling (Figure 8)."""
+"""Choice of the patches of road: corners in the ellipses, shadow removal, sampling (Figure 8)."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ class Corners:
 
     @property
     def n_ell(self) -> int:
-        """Corners of the group that the picture shows."""
+        """Number of corners of the group that the picture shows."""
         return len(self.usable)
 
     @property
     def n_rs(self) -> int:
-        """Corners of the group that are of no use: shadowed, or not drivable."""
+        """Number of unusable corners of the group: shadowed, or not drivable."""
         return self.n_ell - int(np.count_nonzero(self.usable))
 
     @property
@@ -110,7 +110,7 @@ def corners_in_lane(
     curvature_1_m: float,
     wheelbase_m: float,
 ) -> NDArray[np.float64]:
-    """Corners of a grid along the way of the car, ordered across it: the lane ahead, or a side of it.
+    """Corners of a grid along the path of the car, ordered across it: the lane ahead, or a side of it.
 
     Parameters
     ----------
@@ -191,9 +191,9 @@ def sample(corners: Corners, b: int, key: Sequence[int]) -> NDArray[np.intp]:
 
 
 def sample_across(corners: Corners, b: int, key: Sequence[int]) -> NDArray[np.intp]:
-    """Indices of usable corners for b patches, each from its own share of the ground across the way.
+    """Indices of usable corners for b patches, each from its own share of the ground across the path.
 
-    `TRIES` rounds, in each of which every patch has one; corners are ordered across the way. As `sample` where there
+    `TRIES` rounds, in each of which every patch has one; corners are ordered across the path. As `sample` where there
     are too few.
     """
     candidates = np.flatnonzero(corners.usable)
@@ -330,7 +330,7 @@ def middle_ground_m(
 def cut_patch(
     image: NDArray[np.uint8], centre_px: Sequence[float] | NDArray[np.float64], width_px: float
 ) -> NDArray[np.uint8]:
-    """The patch that the surface network looks at.
+    """The input patch of the surface network.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""One picture, two verdicts: the road ahead of the left wheels and of the right wheels."""
+"""Two results from one picture: the road ahead of the left wheels and of the right wheels."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .trajectory import Motion
 
 @dataclass(frozen=True)
 class SidesState:
-    """What the two estimators remember."""
+    """State of the two estimators."""
 
     left: IfeState = field(default_factory=IfeState)
     right: IfeState = field(default_factory=IfeState)
 
     def elsewhere(self) -> SidesState:
-        """The state of a car that may be anywhere by now: no road ahead is known."""
+        """The state after the position was lost: no road ahead is known."""
         return SidesState(self.left.elsewhere(), self.right.elsewhere())
 
     def to_json(self) -> dict[str, Any]:
@@ -54,7 +54,7 @@ class SidesIfe:
     def process(
         self, state: SidesState, image: NDArray[np.uint8], motion: Motion
     ) -> tuple[SidesState, FrameResult, FrameResult]:
-        """One frame.
+        """The state and the results after one frame.
 
         Parameters
         ----------

@@ -24,17 +24,17 @@ HALF_WIDTH_M, BANDS, COLUMNS_OF_BAND = 1.2, 12, 4
 SIDE_M = 0.15
 """Road before and behind a place that are compared [m]."""
 SLANTS = (-0.08, -0.04, 0.0, 0.04, 0.08)
-"""Angles at which a line may lie across the car's way [rad]."""
+"""Angles at which a line may lie across the path [rad]."""
 DARK = 8.0
-"""Grey levels that are added before the logarithm, lest noise in the dark count as a step [8-bit levels]."""
+"""Grey levels added before the logarithm, so that noise in the dark does not count as a step [8-bit levels]."""
 NOISE, TINT_NOISE = 0.01, 0.004
 """Scatter of a step between bands that is never undercut, of brightness and of tint, which scatters less [-]."""
 LEAST_PLAINNESS = 4.0
-"""How many times its own standard error over the bands a step must be, to be a line [-]."""
+"""Least step of a line, in standard errors over the bands [-]."""
 KNOWN_PLAINNESS, KNOWN_WITHIN_M = 2.0, 0.15
 """That of a line so close to where one was seen before [-], [m]."""
 APART_M = 0.3
-"""The plainest of steps so close is the line [m]."""
+"""Of steps within this distance the largest is the line [m]."""
 
 
 def lines_across(
@@ -45,7 +45,7 @@ def lines_across(
     wheelbase_m: float,
     known_m: NDArray[np.float64] | Sequence[float] = (),
 ) -> NDArray[np.float64]:
-    """How far ahead lines cross the car's way, in ascending order.
+    """Distances ahead at which lines cross the path of the car, in ascending order.
 
     Parameters
     ----------
@@ -54,9 +54,9 @@ def lines_across(
     camera : Camera
         Of the picture's own size.
     reach_m : pair of floats
-        Stretch of the way that is searched [m].
+        Stretch of the path that is searched [m].
     curvature_1_m, wheelbase_m : float
-        Of the way, see `wheel_track` [1/m], [m].
+        Of the path, see `wheel_track` [1/m], [m].
     known_m : array, shape (m,)
         Where lines are expected that were seen before [m].
 
@@ -78,12 +78,12 @@ def lines_across(
 
 
 def plainness(logarithm: NDArray[np.float64], noise: float) -> NDArray[np.float64]:
-    """How plainly what is read steps at each row, of the slant at which it is plainest [standard errors].
+    """Size of the step at each row, at the slant with the largest one [standard errors].
 
     Parameters
     ----------
     logarithm : array, shape (rows, bands)
-        Of the brightness or the tint, rows in the order of the way, `SAMPLE_M` apart [-].
+        Of the brightness or the tint, rows in the order of the path, `SAMPLE_M` apart [-].
     noise : float
         Standard error that is never undercut [-].
 

@@ -1,9 +1,8 @@
-"""What patches along the road show together: a surface goes on, and changes at one place.
+"""Class probabilities of patches along the road, read together by a hidden Markov model.
 
-The road is a chain of cells whose class seldom changes, and each patch has a say in its own cell: a hidden Markov
-chain, read forwards and backwards. Road behind and ahead speaks for the road between, and a border lies where it fits
-best what is seen on both sides of it. What has been passed is not kept patch by patch: all that it tells of the road to
-come is how likely each class is where it ends.
+The road is a chain of cells whose class seldom changes, and each patch is an observation of its own cell. Forward and
+backward passes combine the observations, so that a border lies where it fits best the patches on both sides of it. Road
+passed is not kept patch by patch, but as the probability of each class at the place where it ends.
 """
 
 from __future__ import annotations
@@ -24,26 +23,26 @@ CHANGES_PER_M = 0.003
 CHANGES_AT_LINE = 0.1
 """How often it changes at a line across the road [-]."""
 SAY = 0.3
-"""Share of a patch's log probabilities that counts [-]: patches of one road and light are wrong together."""
+"""Weight of the log probabilities of a patch [-]: patches of one road and light have correlated errors."""
 SAY_BEFORE = 0.15
-"""The same of a patch of a look ahead [-]: six share one picture, and a picture that is misread is so as a whole."""
+"""The same for a remembered patch [-]: six share one picture, and their errors are correlated."""
 LEAST_PROBABILITY = 0.02
-"""No patch says that a class is less likely, nor all of the road behind [-]."""
+"""Lower bound of the probability of a class, of a patch and of the road passed [-]."""
 OWN_SHARE = 0.5
-"""How much of a patch's probabilities stays its own [-]: what all patches of a road agree on may be wrong, and the
-chain alone would be sure of it."""
+"""Share of the own probabilities of a patch in the result [-]: all patches of a road may be wrong together, and the
+chain alone would be overconfident."""
 EVEN = np.full(len(Surface), 1.0 / len(Surface))
-"""Where nothing is known [-]."""
+"""Probabilities without any information [-]."""
 
 
 @dataclass(frozen=True)
 class Passed:
-    """What all of the road up to a place tells of the class there.
+    """Probabilities of the class at a place, from all of the road up to it.
 
     Attributes
     ----------
     end_m : float
-        The place on the way [m].
+        The place on the path [m].
     probabilities : tuple of 3 floats
         Of dry, wet, snow and ice [-].
     """
@@ -52,7 +51,7 @@ class Passed:
     probabilities: tuple[float, float, float]
 
     def seen_from(self, way_m: float) -> Passed:
-        """The same, measured from a place on the way."""
+        """The same, measured from a place on the path."""
         return replace(self, end_m=self.end_m - way_m)
 
     def to_json(self) -> list[Any]:
@@ -73,18 +72,18 @@ def among_neighbours(
     passed: Passed | None = None,
     before: int = 0,
 ) -> NDArray[np.float64]:
-    """Probabilities of each patch, half of them those that its place has by all that is seen of the road.
+    """Probabilities of each patch: half its own, half those of its cell by all patches of the road.
 
     Parameters
     ----------
     ahead_m : array, shape (n,)
-        Where the patches lie along the way [m].
+        Positions of the patches along the path [m].
     probabilities : array, shape (n, 3)
         Calibrated probabilities of each by itself [-].
     lines_m : array, shape (m,)
         Where lines cross the road, ascending: a class is likelier to end there than elsewhere [m].
     passed : Passed, optional
-        The road before the patches, on the same way.
+        The road before the patches, on the same path.
     before : int
         How many of them, the last, were seen in frames before.
 
@@ -129,7 +128,7 @@ def _as_passed(end_m: float, probabilities: NDArray[np.float64]) -> Passed:
 def _told(
     passed: Passed | None, place_m: float, lines_m: NDArray[np.float64] | Sequence[float]
 ) -> NDArray[np.float64]:
-    """What the road passed tells of a place: the less the further on it lies, and the more lines are between [-]."""
+    """Class probabilities at a place by the road passed, which fade with the distance and the lines between [-]."""
     if passed is None:
         return EVEN
     k = len(EVEN)

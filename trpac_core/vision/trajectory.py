@@ -1,4 +1,4 @@
-"""Where the front wheels will roll: kinematic bicycle, its covariance and the ellipses, Eqs. (1) to (4).
+"""Predicted tracks of the front wheels: kinematic bicycle, its covariance and the ellipses, Eqs. (1) to (4).
 
 All positions are in the axes of `camera.py`: x forward, y left, origin below the centre of the front axle at
 the moment of the picture. The path is followed by distance, not by time, so that the road ahead is also
@@ -21,7 +21,7 @@ FLOOR_SPEED_M_S = 5.0
 """Speed below which the road ahead is judged as if driven at this speed [m/s].
 
 The recursion's time step is the distance step over the speed, so the ellipses would grow without bound
-towards standstill; and a yaw rate says nothing of the path of a car that stands.
+towards standstill; and a yaw rate does not give the path of a standing car.
 """
 
 STEEPEST_CURVATURE_1_M = 0.4
@@ -30,11 +30,11 @@ STEEPEST_CURVATURE_1_M = 0.4
 
 @dataclass(frozen=True)
 class Motion:
-    """How the car moves when the picture is taken.
+    """Motion of the car when the picture is taken.
 
     `yaw_rate_rad_s` (positive to the left) takes the place of the steering angle (front wheels, positive to
-    the left) where it is given and the car is faster than the floor speed. `way_m` is the way of the front wheels since
-    any start [m]; where it is not given, no road is recognised from frame to frame.
+    the left) where it is given and the car is faster than the floor speed. `way_m` is the distance driven by the front
+    wheels since any start [m]; without it no road is recognised from frame to frame.
     """
 
     speed_m_s: float
@@ -44,7 +44,7 @@ class Motion:
     way_m: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what no car does; raises ValueError."""
+        """Refuse impossible motions; raises ValueError."""
         values = (
             self.speed_m_s,
             self.longitudinal_acceleration_m_s2,
@@ -80,7 +80,7 @@ class Ellipses:
     covariance_m2: NDArray[np.float64]
 
     def within(self, from_m: float, to_m: float) -> Ellipses:
-        """The ellipses whose centres lie in [from, to) along the way [m]."""
+        """The ellipses whose centres lie in [from, to) along the path [m]."""
         chosen = (self.distance_m >= from_m) & (self.distance_m < to_m)
         return Ellipses(self.distance_m[chosen], self.centre_m[chosen], self.covariance_m2[chosen])
 
@@ -156,7 +156,7 @@ def position_covariance(
     """Covariance of the reckoned position, P(k+1) = F P(k) F' + Q, Eqs. (3) and (4).
 
     The time step of F is the distance step over the speed. Q is as printed: sigma_x^2 = k1 v and sigma_y^2 =
-    k2 v on the velocities, once per step. P(0), on which the paper is silent, is the width of the tyre's
+    k2 v on the velocities, once per step. P(0), for which the paper gives no value, is the width of the tyre's
     print and of the mounting's error.
 
     Parameters

@@ -13,21 +13,28 @@ from .operations import OPERATIONS
 from .outcome import Cell, Outcome
 
 NOT_RUN = "not run"
+JOIN = ", "
+"""Between the units of one table."""
 DOCUMENT = Path(__file__).parents[3] / "docs" / "reference" / "conformance.md"
-HEAD = """# Which client can do what with the units
+HEAD = """# Conformance: which client can do what
 
-Written by `python -m benchmarks.robustness.conformance`; do not edit. It builds the units and lets each client do
-everything in the first column, in a process of its own, so that a crash is a cell. `ok` is held to numbers: the
-unit's own code, called without FMI, gives the same outputs bit for bit. `-` is not offered by the client or not there
-in the unit, `FAILED` what it says; the numbers stand for the reasons below.
+Written by `python -m benchmarks.robustness.conformance`; do not edit. Every client does every operation of the first
+column with every unit, each in a process of its own. Units with equal tables are listed together.
 
-libcosim hands over step sizes that are differences of times: it is compared to 1e-12,
-without `TRPAC_std`, which is renewed block of time by block of time, one step earlier or later there. fmpy's own
-remoting serves units for another platform only (Windows units under wine), so "fmpy, own process" is fmpy behind a
-pipe. The C program is ours, on the FMI headers that fmpy ships.
+| cell | meaning |
+|---|---|
+| `ok` | done, and the outputs equal those of the unit's own code without FMI, bit for bit |
+| `-` | the client does not offer it, or the unit does not have it |
+| `FAILED` | not done, or other outputs; the reason is the client's message |
 
-Units with Python are given a picture, native units the road's class by number, the plant neither. The C program runs
-native units in an empty environment, proxyfmu with nothing but itself and `unzip` on PATH: neither can find a Python.
+Numbers refer to the reasons at the end of the page.
+
+- libcosim is compared to 1e-12 and without `TRPAC_std`: its step sizes are differences of times.
+- "fmpy, own process" is fmpy in a second process. fmpy's own remoting is for units of another platform only.
+- "C program" is a program of this project with the FMI headers of fmpy. "ecospy, proxyfmu" runs the unit in the
+  process `proxyfmu`.
+- Units of kind python get a picture, native units the road class as a number, and the plant neither.
+- Native units run without any Python in the C program (empty environment) and in proxyfmu.
 """
 
 
@@ -51,10 +58,13 @@ def document(cells: Mapping[Place, Cell], versions: Mapping[str, str]) -> str:
     """The whole document."""
     reasons: dict[str, int] = {}
     lines = [HEAD, "Run on " + ", ".join(f"{name} {number}" for name, number in versions.items()) + ".", ""]
+    alike: dict[tuple[str, ...], list[str]] = {}
     for unit in TITLES:
-        lines += [f"## {unit}", "", "| | " + " | ".join(c.title for c in CLIENTS.values()) + " |"]
+        alike.setdefault(tuple(rows(cells, unit)), []).append(unit)
+    for found, units in alike.items():
+        lines += [f"## {JOIN.join(units)}", "", "| | " + " | ".join(c.title for c in CLIENTS.values()) + " |"]
         lines.append("|---" * (len(CLIENTS) + 1) + "|")
-        lines += [_numbered(row, reasons) for row in rows(cells, unit)] + [""]
+        lines += [_numbered(row, reasons) for row in found] + [""]
     lines += ["## Reasons", ""]
     lines += [f"{number}. {reason}" for reason, number in reasons.items()]
     return "\n".join(lines) + "\n"
@@ -73,15 +83,15 @@ def read_cells(text: str) -> dict[Place, Cell]:
     operations = {title: name for name, title in OPERATIONS.items()}
     found: dict[Place, Cell] = {}
     for section in text.split("\n## ")[1:]:
-        unit, *lines = section.splitlines()
-        if unit not in TITLES:
-            continue
+        heading, *lines = section.splitlines()
+        units = [unit for unit in heading.split(JOIN) if unit in TITLES]
         for line in lines:
             title, *cells = [part.strip() for part in line.strip("|").split("|")]
             if title in operations:
                 for client, cell in zip(CLIENTS, cells, strict=True):
                     if cell != NOT_RUN:
                         outcome, _, number = cell.partition(" ")
-                        place = Place(client, unit, operations[title])
-                        found[place] = Cell(Outcome(outcome), reasons.get(number, ""))
+                        for unit in units:
+                            place = Place(client, unit, operations[title])
+                            found[place] = Cell(Outcome(outcome), reasons.get(number, ""))
     return found

@@ -170,15 +170,15 @@ bool add_tyres(Text *text, const OneWheel *wheel)
     if (!learnt_n.has)
         return false;
     add(text, wheel->config.front_axle ? "Front" : "Rear");
-    add(text, " tyres do not follow the told curve: slip stiffness learnt ");
+    add(text, " tyres do not follow the expected curve: slip stiffness estimated ");
     add_fixed(text, 1e-3 * learnt_n.value, 0, false);
     add(text, " kN per unit slip at ");
     add_fixed(text, 1e-3 * load_n, 1, false);
-    add(text, " kN load, told ");
+    add(text, " kN load, expected ");
     add_fixed(text, 1e-3 * (INITIAL_SLOPE * known->wheel.stiffness_n), 0, false);
     add(text, " kN (");
     add_short(text, INITIAL_SLOPE);
-    add(text, " C_x). TRPAC is an interval here; adjust tyre.longitudinal_stiffness_n in vehicle.yaml.");
+    add(text, " C_x). Use TRPAC_low and TRPAC_high, and adjust tyre.longitudinal_stiffness_n in vehicle.yaml.");
     return true;
 }
 
@@ -191,11 +191,11 @@ bool add_wheels(Text *text, const OneWheel *wheel)
     if (!offset.has)
         return false;
     add(text, wheel->config.front_axle ? "Front" : "Rear");
-    add(text, " wheels do not have the told radius: slip without force learnt ");
+    add(text, " wheels do not have the expected radius: slip without force estimated ");
     add_fixed(text, 100.0 * offset.value, 1, true);
     add(text, " %, as of a radius of ");
     add_fixed(text, told_m * (1.0 - offset.value), 4, false);
-    add(text, " m, told ");
+    add(text, " m, expected ");
     add_fixed(text, told_m, 4, false);
     add(text, " m. Adjust wheel_radius_m in vehicle.yaml.");
     return true;

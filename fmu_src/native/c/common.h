@@ -57,7 +57,7 @@ bool class_good(Text *why, const char *name, int road_class, const char *confide
 void add_unusable(Text *text, Unusable reason, const Sensors *sensors);
 /* Which readings are no road car's, as bits. */
 unsigned implausible(const Sensors *sensors);
-/* The sentences on a tyre or a wheel that is not as told; false where there is nothing to say. */
+/* The sentences on a tyre or a wheel that differs from its description; false where neither does. */
 bool add_tyres(Text *text, const OneWheel *wheel);
 bool add_wheels(Text *text, const OneWheel *wheel);
 /* Whether no index in a state leads out of its array. */

@@ -281,7 +281,7 @@ def test_a_library_for_two_processors_holds_both_where_its_head_says():
 
 
 @pytest.mark.long
-@pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang: pip install 'trpac-fmu[native]'")
+@pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang: pip install ziglang")
 def test_the_libraries_of_all_platforms_are_the_same_bytes_each_time(tmp_path):
     info = UNITS["TrpacEstimator"].info
     first, second = (
