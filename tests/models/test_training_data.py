@@ -17,6 +17,7 @@ from training_folder import LowerHalf, row, write_folder
 from models.training import (
     augment,
     calibrate,
+    cards,
     data,
     keeping,
     outliers,
@@ -398,6 +399,19 @@ def test_of_pictures_of_ones_own_the_road_is_found_and_masks_are_for_the_segment
     assert len(patches.judged_patches(found)) > 0
     masked = replace(pictures[0], mask=tmp_path / "mask.png")
     assert not masked.road_is_found
+
+
+def test_a_card_of_ones_own_pictures_says_nothing_of_the_packages(tmp_path, monkeypatch):
+    monkeypatch.setattr(cards, "PACKAGES", ())
+    told = []
+    for folder in ("mine", "condition_web/a"):
+        name = f"{folder}/a.png"
+        made = write_folder(
+            tmp_path / folder[0], [row(name, "train", "dry")], {name: np.zeros((9, 9, 3), np.uint8)}
+        )
+        facts = cards.RunFacts("", 1, data.read_manifest(made), {"train": 3}, {"train": "from 1"}, 1.0, 2)
+        told.append((facts.own, "other_cameras" in cards.splits_text(facts)))
+    assert told == [(True, False), (False, True)]
 
 
 def test_pictures_of_ones_own_need_no_share(tmp_path, monkeypatch):
