@@ -369,7 +369,7 @@ def test_networks_of_ones_own_judge_pictures_and_go_into_a_unit(tmp_path):
         with pytest.raises(trpac.TrpacError, match="holds no networks"):
             trpac.build_fmu(tmp_path, networks=own, **given)
     (own / "surface.onnx").write_bytes(b"no network")
-    with pytest.raises(trpac.TrpacError, match="surface.onnx"):
+    with pytest.raises(trpac.TrpacError, match=r"surface\.onnx"):
         trpac.build_fmu(tmp_path, networks=own)
 
 
