@@ -36,8 +36,8 @@ MethodOption = Annotated[
     str,
     typer.Option(
         "--method",
-        help="Estimator:\n\nas_printed: the paper's equations, and nothing else.\n\ndife: they, guarded against noise "
-        "and wrong classes.\n\nrobust: an interval, where the tyre's curve is not known.",
+        help="Estimator:\n\nas_printed: the equations of the paper, unchanged.\n\ndife: the paper's fusion with guards "
+        "against noise and wrong classes.\n\nrobust: for a car or a tyre that is not known exactly, with an interval.",
     ),
 ]
 
@@ -46,8 +46,8 @@ UnitOption = Annotated[
     typer.Option(
         "--unit",
         metavar="|".join(KINDS),
-        help="Kind of the unit that is built where --fmu names none:\n\npython: with the networks in it; the default."
-        "\n\nnative: in C, without Python; pictures are classified beside it, and it is told class and confidence.",
+        help="Kind of FMU to build if --fmu is not given:\n\npython: contains the networks; the default."
+        "\n\nnative: in C, without Python; pictures are classified outside the FMU.",
     ),
 ]
 

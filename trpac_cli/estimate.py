@@ -1,4 +1,4 @@
-"""The command `trpac estimate`: the estimator over a recorded log."""
+"""The command `trpac estimate`: the estimator along a recorded drive."""
 
 from __future__ import annotations
 
@@ -15,55 +15,60 @@ COMMAND = "trpac estimate"
 
 
 def estimate(
-    log: Annotated[Path, typer.Argument(help="Recorded drive: a table, MDF, MAT-file or bus log.")],
+    log: Annotated[
+        Path, typer.Argument(help="Recorded drive: text table, Parquet, MDF, MAT-file or raw bus log.")
+    ],
     out: Annotated[Path, typer.Option(help="Folder for estimates.csv, report.html and summary.json.")],
     vehicle: Annotated[
         Path | None,
-        typer.Option(help="The car: vehicle.yaml. Without it the paper's car is assumed, and said so."),
+        typer.Option(help="Car file. Without it the paper's car is assumed, with a warning."),
     ] = None,
     camera: Annotated[
         Path | None,
-        typer.Option(
-            help="The camera: camera.yaml; then the pictures that column image_path names are used."
-        ),
+        typer.Option(help="Camera file. The pictures named in the column image_path are then classified."),
     ] = None,
     mapping: Annotated[
         Path | None,
-        typer.Option("--map", help="How the log's columns and units become the contract's: mapping.yaml."),
+        typer.Option(
+            "--map", help="Mapping file: where each column of the log format is, and in which unit."
+        ),
     ] = None,
     dbc: Annotated[
         list[Path] | None,
-        typer.Option(help="What the frames of a bus log mean: car.dbc; may be repeated."),
+        typer.Option(help="DBC file of a raw bus log; may be repeated."),
     ] = None,
     peers: Annotated[
         bool,
-        typer.Option("--peers", help="Also slip-slope and two Kalman filters; takes a few times as long."),
+        typer.Option(
+            "--peers",
+            help="Also run a slip-slope estimator and two Kalman filters, for comparison; takes a few times as long.",
+        ),
     ] = False,
     method: MethodOption = "robust",
 ) -> None:
-    """Estimate the road's adhesion along a recorded drive.
+    """Estimate the peak friction (TRPAC) along a recorded drive, with an interval for each sample.
 
-    Needs torque and speed of four wheels, vehicle speed, acceleration and
-    position, 50 Hz to 2 kHz; names and units of your tool go into a mapping
-    file. Classes of a camera (image_class, image_confidence, image_from_m,
-    image_to_m) are used where the log has them, pictures with --camera.
-    With a column mu_reference (peak friction), summary.json holds the errors.
+    The log needs torque and speed of the four wheels, vehicle speed and
+    longitudinal acceleration at 50 Hz to 2 kHz. Other names and units go into
+    a mapping file; trpac log check proposes one.
 
-    The estimate moves only where a tyre slips enough to show the road: brake
-    or accelerate up to a slip of 0.02 or more. TRPAC_std says how much to
-    believe. What decides is the tyre's stiffness in vehicle.yaml and the
-    wheels' rolling radius: 1 % of radius is a slip of 0.01.
+    The friction can be found only where a tyre slips enough: brake or
+    accelerate up to a slip of 0.02 or more. Elsewhere TRPAC_std and the
+    interval TRPAC_low to TRPAC_high are wide.
+    The tyre stiffness and the rolling radius in the car file decide the
+    result: a radius error of 1 % is a slip error of 0.01.
 
-    Example: trpac estimate drive.mf4 --vehicle car.yaml --map mapping.yaml
-    --out out/drive
+    Camera: --camera classifies pictures; classes of the log (image_class,
+    image_confidence, image_from_m, image_to_m) are used without it.
+    With a column mu_reference (measured peak friction) the errors are stated.
 
-    A raw log of the bus (BLF, ASC, candump, TRC, MDF) needs --dbc car.dbc;
-    its columns are named Message.Signal.
+    Example, with the files of trpac example example:
+    trpac estimate example/foreign.csv --map example/mapping.yaml
+    --vehicle example/car.yaml --out out/drive
 
-    Ready-made mapping files lie in sim2real/mappings, formats in docs/guide/logs.md,
-    how to read the result in docs/guide/estimate.md.
+    Guide: docs/guide/estimate.md. Formats and mapping files: docs/guide/logs.md.
 
-    Exit codes: 0 with an estimate, 2 unusable input, and then nothing is written.
+    Exit codes: 0 done, 2 unusable input; then nothing is written.
     """
     import trpac
 

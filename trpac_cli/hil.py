@@ -1,4 +1,4 @@
-"""The commands `trpac hil` and `trpac hil-plant`: the unit on a CAN bus in wall-clock time, and a car to go with it."""
+"""The commands `trpac hil` and `trpac hil-plant`: the FMU on a CAN bus in real time, and a simulated car for it."""
 
 from __future__ import annotations
 
@@ -41,32 +41,39 @@ MULTICAST = "239.74.163.2"
 CHANNELS = {"virtual": "trpac", "udp_multicast": MULTICAST, "socketcan": "can0"}
 
 Interface = Annotated[
-    str, typer.Option(help="Any interface of python-can: virtual, udp_multicast, socketcan, pcan, vector ...")
+    str, typer.Option(help="Interface of python-can: virtual, udp_multicast, socketcan, pcan, vector ...")
 ]
 Channel = Annotated[
     str | None,
-    typer.Option(help="Its channel, such as can1; virtual, UDP and socketcan (can0) have a default."),
+    typer.Option(
+        help="Channel of the interface, such as can1; virtual, udp_multicast and socketcan have a default."
+    ),
 ]
 Options = Annotated[
     list[str] | None,
-    typer.Option("--bus-option", help="NAME=VALUE for the interface, such as bitrate=1000000; repeatable."),
+    typer.Option(
+        "--bus-option", help="Option of the interface: NAME=VALUE, such as bitrate=1000000; may be repeated."
+    ),
 ]
 Dbc = Annotated[
     Path | None,
-    typer.Option(help="DBC file: any with --signals; else with the shipped one's names."),
+    typer.Option(
+        help="DBC file of the bus: any file with --signals, else one with the names of the shipped trpac.dbc."
+    ),
 ]
 Signals = Annotated[
     Path | None,
     typer.Option(
-        help="Mapping file of the DBC file's signals, as of a log: vehicle_speed_m_s: {column: Motion.VehSpd} ..."
+        help="Mapping file of the signals, as for a log: vehicle_speed_m_s: {column: Motion.VehSpd} ..."
     ),
 ]
 Rate = Annotated[float, typer.Option(min=100.0, max=1000.0, help="Cycles per second.")]
 Duration = Annotated[
-    float | None, typer.Option(min=0.01, max=1e6, help="Ends by itself after this time \\[s].")
+    float | None, typer.Option(min=0.01, max=1e6, help="Length of the run \\[s]; without it until Ctrl-C.")
 ]
 ScenarioOption = Annotated[
-    Path | None, typer.Option(help="Car, road and sensor noise of the plant; the paper's by default.")
+    Path | None,
+    typer.Option(help="Scenario file: car, road and sensor noise of the plant; by default the paper's."),
 ]
 
 
@@ -74,9 +81,7 @@ def hil(
     out: Annotated[Path, typer.Option(help="Folder for log.mf4 and summary.json.")],
     fmu: Annotated[
         Path | None,
-        typer.Option(
-            help="TrpacEstimator.fmu or TrpacEstimator4W.fmu, of either kind; without it one is built."
-        ),
+        typer.Option(help="FMU: TrpacEstimator or TrpacEstimator4W; without it TrpacEstimator is built."),
     ] = None,
     unit: UnitOption = None,
     interface: Interface = "virtual",
@@ -86,21 +91,22 @@ def hil(
     signals: Signals = None,
     rate_hz: Rate = 1000.0,
     duration_s: Duration = None,
-    wheel: Annotated[str, typer.Option(help="Wheel of a unit of one wheel: fl, fr, rl or rr.")] = "fl",
-    vehicle: Annotated[
-        Path | None, typer.Option(help="The car: vehicle.yaml; by default the paper's.")
-    ] = None,
+    wheel: Annotated[str, typer.Option(help="Wheel of a one-wheel FMU: fl, fr, rl or rr.")] = "fl",
+    vehicle: Annotated[Path | None, typer.Option(help="Car file; by default the paper's car.")] = None,
     parameter: Annotated[
-        list[str] | None, typer.Option(help="NAME=VALUE of the unit, such as estimator.gamma=10; repeatable.")
+        list[str] | None,
+        typer.Option(help="Parameter of the FMU: NAME=VALUE, such as estimator.gamma=10; may be repeated."),
     ] = None,
     method: MethodOption = "robust",
     frames: Annotated[
-        Path | None, typer.Option(help="Folder of pictures to play; without it classes come by bus.")
+        Path | None,
+        typer.Option(help="Folder of pictures to play; without it the classes come from the bus."),
     ] = None,
-    camera: Annotated[Path | None, typer.Option(help="camera.yaml of the pictures.")] = None,
+    camera: Annotated[Path | None, typer.Option(help="Camera file of the pictures.")] = None,
     fps: Annotated[float, typer.Option(min=0.1, max=200.0, help="Pictures per second.")] = 20.0,
     with_plant: Annotated[
-        bool, typer.Option("--with-plant", help="Also play the car on the same bus: no hardware needed.")
+        bool,
+        typer.Option("--with-plant", help="Also simulate the car on the same bus; no hardware is needed."),
     ] = False,
     scenario: ScenarioOption = None,
     wait_s: Annotated[
@@ -108,45 +114,48 @@ def hil(
         typer.Option(
             min=0.0,
             max=1e6,
-            help="Longest time to listen for what the unit needs, before the first cycle \\[s].",
+            help="Longest time to wait for the required signals before the first cycle \\[s].",
         ),
     ] = WAIT_S,
     no_wait: Annotated[
-        bool, typer.Option("--no-wait", help="Begin at once; the estimate starts when its signals come.")
+        bool,
+        typer.Option("--no-wait", help="Start at once; the estimate starts when the required signals come."),
     ] = False,
     record_bus: Annotated[
         Path | None,
-        typer.Option(help="File for all messages of the bus: .blf, .asc, .log (candump) or .mf4."),
+        typer.Option(help="Record all messages of the bus: .blf, .asc, .log (candump) or .mf4."),
     ] = None,
     no_log: Annotated[bool, typer.Option("--no-log", help="Write no log.mf4.")] = False,
     no_counters: Annotated[
-        bool, typer.Option("--no-counters", help="The senders do not count their messages.")
+        bool, typer.Option("--no-counters", help="Do not check message counters: the senders do not count.")
     ] = False,
     realtime: Annotated[bool, typer.Option("--realtime", help="Ask for real-time priority.")] = False,
     core: Annotated[
         int | None,
-        typer.Option(min=0, help="Core for the loop alone; with --realtime the last one by default."),
+        typer.Option(min=0, help="Core for the loop alone; with --realtime by default the last one."),
     ] = None,
     camera_threads: Annotated[int, typer.Option(min=1, max=16, help="Threads of each network.")] = 1,
     events_only: Annotated[
-        bool, typer.Option("--quiet", help="No table while it runs, events only.")
+        bool, typer.Option("--quiet", help="Print events only, no table during the run.")
     ] = False,
 ) -> None:
-    """Step the unit in real time against a CAN bus; end with Ctrl-C.
+    """Run the FMU in real time against a CAN bus; Ctrl-C ends the run.
 
-    Wheel speeds, torques, vehicle speed and the road's class come in, TRPAC,
-    flag and K_v go out, as trpac_hil/trpac.dbc says (docs/reference/bus_messages.md).
+    It receives wheel speeds and torques, vehicle speed and the class of the
+    road. It sends TRPAC, flag and K_v. Messages: docs/reference/bus_messages.md.
 
     Example without hardware: trpac hil --with-plant --duration-s 30 --out out/hil
 
-    Example on a bus: trpac hil --fmu dist/TrpacEstimator.fmu --interface socketcan
-    --channel can0 --frames frames --camera camera.yaml --out out/hil
+    On a bus of your own: trpac hil --dbc car.dbc --signals signals.yaml
+    --interface socketcan --channel can0 --out out/rig
 
-    Before the first cycle it listens for what the unit needs and shows it; what
-    does not come within --wait-s is named, and nothing is written (exit code 2).
+    Before the first cycle it waits for the required signals and shows them. If
+    one is missing after --wait-s, it is named and nothing is written.
 
-    Exit codes: 0 done or ended by Ctrl-C, also with deadlines missed; 2 unusable input, no bus, or signals missing; 4
-    ran, but the log could not be written; 5 a process beside the loop died, which ended the run.
+    Guide: docs/guide/bus.md.
+
+    Exit codes: 0 done or ended by Ctrl-C, even with missed deadlines; 2 unusable input, no bus, or missing signals; 4
+    log or recording could not be written; 5 the process of camera, recorder or plant ended, which ended the run.
     """
     from trpac_core.errors import TrpacError
     from trpac_hil.codec import DBC_FILE
@@ -211,19 +220,24 @@ def hil_plant(
     duration_s: Duration = None,
     scenario: ScenarioOption = None,
     camera_fps: Annotated[
-        float, typer.Option(min=0.0, max=200.0, help="Results per second of a camera on the bus; 0: none.")
+        float,
+        typer.Option(
+            min=0.0, max=200.0, help="Results per second of a simulated camera on the bus; 0: no camera."
+        ),
     ] = 20.0,
     camera_delay_s: Annotated[
-        float, typer.Option(min=0.0, max=2.0, help="From a picture to its result on the bus \\[s].")
+        float, typer.Option(min=0.0, max=2.0, help="Delay from a picture to its result on the bus \\[s].")
     ] = 0.06,
 ) -> None:
-    """Play the reference plant on a CAN bus in real time, as the car for trpac hil; end with Ctrl-C.
+    """Simulate the car on a CAN bus in real time, for trpac hil in another process; Ctrl-C ends it.
 
-    It drives up and down between 4 and 14 m/s over the scenario's road, again
-    and again.
+    The reference plant drives over the road of the scenario again and again,
+    between 4 and 14 m/s.
 
     Example, in two terminals: trpac hil-plant, and
     trpac hil --interface udp_multicast --out out/hil
+
+    Guide: docs/guide/bus.md.
 
     Exit codes: 0 done or ended by Ctrl-C, 2 unusable input or no bus.
     """
@@ -248,7 +262,7 @@ def hil_plant(
         slots = None if duration_s is None else round(duration_s * rate_hz)
         node.run(SystemClock().now_ns() + RUN_UP_NS, stopper, slots)
     node.close()
-    print(f"{PLANT_COMMAND}: {node.left_out} cycles were left out for being late.", file=sys.stderr)
+    print(f"{PLANT_COMMAND}: {node.left_out} cycles were left out because they were late.", file=sys.stderr)
 
 
 def _silence_libraries() -> None:

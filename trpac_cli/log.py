@@ -1,4 +1,4 @@
-"""The command `trpac log check`: how a recorded log is understood."""
+"""The command `trpac log check`: how a recorded log is read."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COMMAND = "trpac log check"
 EXIT_NOT_ENOUGH = 1
 """Exit code of a file that can be read and does not hold what an estimate needs."""
 
-app = typer.Typer(help="Recorded logs: what a file holds, and how it is understood.", no_args_is_help=True)
+app = typer.Typer(help="Recorded logs: check how a file is read.", no_args_is_help=True)
 
 
 @app.callback()
@@ -32,38 +32,44 @@ def _group() -> None:
 def check(
     log: Annotated[
         Path,
-        typer.Argument(help="Recorded drive: a table (CSV and kin), Parquet, MDF, MAT or a raw bus log."),
+        typer.Argument(help="Recorded drive: text table, Parquet, MDF, MAT-file or raw bus log."),
     ],
     mapping: Annotated[
         Path | None,
-        typer.Option("--map", help="How its columns and units become the log format's: mapping.yaml."),
+        typer.Option(
+            "--map", help="Mapping file: where each column of the log format is, and in which unit."
+        ),
     ] = None,
     dbc: Annotated[
         list[Path] | None,
-        typer.Option(help="DBC file of a raw bus log (BLF, ASC, candump, TRC, MDF); may be repeated."),
+        typer.Option(help="DBC file of a raw bus log; may be repeated."),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="Write the log in the log format's names and units: .parquet, .csv or .mf4."),
+        typer.Option(
+            help="Write the log with the names and units of the log format: .parquet, .csv or .mf4."
+        ),
     ] = None,
-    picture: Annotated[Path | None, typer.Option(help="Write a picture of its signals: .png.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Write a figure of the signals: .png.")] = None,
     propose: Annotated[
         Path | None,
-        typer.Option(help="Write a mapping file to correct by hand, by the columns' names and units: .yaml."),
+        typer.Option(
+            help="Write a draft of a mapping file, by names and units of the columns: .yaml. Correct it by hand."
+        ),
     ] = None,
 ) -> None:
-    """Show how a log is understood: each column's source, unit and range, what was mended, what is missing.
+    """Show how each column of a log is read: source, unit, rate, range, lost samples, what is missing.
 
-    Where columns have other names than the log format's, a mapping file is
-    proposed; nothing of it is used before you give it with --map.
+    If columns have other names than those of the log format, a draft of a
+    mapping file is shown. Correct it and give it with --map.
 
-    Example: trpac log check drive.csv --propose map.yaml --picture drive.png,
-    then, with map.yaml corrected:
-    trpac log check drive.csv --map map.yaml --out drive.parquet
+    Example, with the files of trpac example example:
+    trpac log check example/foreign.csv --map example/mapping.yaml
+    --picture drive.png --out drive.parquet
 
-    Names, units and mapping files: docs/guide/logs.md.
+    Columns, units and mapping files: docs/guide/logs.md.
 
-    Exit codes: 0 fit for use, 1 readable but not enough, 2 not readable, and then nothing is written.
+    Exit codes: 0 usable, 1 readable but columns are missing, 2 not readable; then nothing is written.
     """
     from scenarios.whole_files import write_whole, written_whole
     from sim2real.logs.inspection import draw, missing_for_diagnosis, missing_for_estimate
@@ -117,14 +123,14 @@ def check(
         refuse(COMMAND, error)
     if propose is None and lacks and candidates(found.table):
         console.print(
-            "\nA mapping file to correct by hand and to give with --map (--propose FILE writes it):\n"
+            "\nDraft of a mapping file. Correct it and give it with --map (--propose FILE writes it):\n"
         )
         console.print(proposed_mapping(found.table, log.name), soft_wrap=True)
     if written:
         console.print("  ".join(str(path) for path in written), soft_wrap=True)
     if not fit:
         if out is not None:
-            console.print(f"{out} was not written: the log lacks what stands above.", style="red")
+            console.print(f"{out} was not written: see the problems above.", style="red")
         raise typer.Exit(EXIT_NOT_ENOUGH)
 
 

@@ -27,23 +27,32 @@ MOST_NAMED = 5
 
 
 def sweep(
-    file: Annotated[Path, typer.Argument(help="Sweep file, such as scenarios/sweeps/paper_simulation.yaml.")],
+    file: Annotated[
+        Path, typer.Argument(help="Sweep file, or the name of a shipped one, such as paper_simulation.")
+    ],
     out: Annotated[Path, typer.Option(help="Folder for runs.parquet, report.html and summary.json.")],
     scheduler: Annotated[
         str | None,
-        typer.Option(help="Address of a running Dask cluster; without it processes of this machine."),
+        typer.Option(help="Address of a running Dask cluster; without it the runs use this machine."),
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes of this machine; one per core.")] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Processes on this machine; by default one per core.")
+    ] = None,
     allow_code: Annotated[
         bool,
-        typer.Option("--allow-code", help="Run estimators that the file names as package.module:function."),
+        typer.Option(
+            "--allow-code",
+            help="Allow estimators of your own, package.module:function, in the sweep file: this runs their code.",
+        ),
     ] = False,
 ) -> None:
-    """Run a scenario many times over drawn roads, noise, errors and disturbances; write table and report.
+    """Run a scenario many times with random roads, noise, errors and disturbances; write a table and a report.
 
-    Stopped, it goes on where it was when called again with the same folder: every finished run is kept at once.
+    If it is stopped, call it again with the same folder: finished runs are kept.
 
-    Example: trpac sweep scenarios/sweeps/paper_simulation.yaml --out out/sweep
+    Example: trpac sweep paper_simulation --runs 10 --out out/sweep
+
+    Guide: docs/guide/sweep.md.
 
     Exit codes: 0 done, 1 done but some runs failed, 2 unusable input.
     """

@@ -141,7 +141,7 @@ class Link:
                 why = f"the interface's driver or package is not installed ({quoted(error)})"
             why = WHY.get(getattr(error, "errno", None) or 0, why).rstrip(".")
             raise HilError(
-                f"{quoted(name)} cannot be opened: {why}. Check --interface, --channel, --bus-option; "
+                f"{quoted(name)} cannot be opened: {why}. Check --interface, --channel and --bus-option; "
                 "docs/guide/bus.md has examples."
             ) from error
 
@@ -187,7 +187,7 @@ class Link:
         self.garbled += 1
         self._report(
             "garbled",
-            f"What came is no CAN message and was left aside ({quoted(why)}). "
+            f"A received packet is not a CAN message and is ignored ({quoted(why)}). "
             "Something else sends to the bus's address; give the bus one of its own.",
         )
 

@@ -101,7 +101,7 @@ class CameraInput:
             self.losses += 1
             report(
                 "lost camera",
-                f"No result of a picture for {self._stale_ns * 1e-6:g} ms: on without the camera.",
+                f"No result of a picture for {self._stale_ns * 1e-6:g} ms: the loop continues without the camera.",
             )
         known = tuple(stamps.known(side, odometer.position_m) for side in range(len(self._given)))
         if known == self._given:
@@ -146,7 +146,7 @@ class CameraInput:
             age_ms = 0.0
             report(
                 "class without age",
-                "RoadClass_Age is not available: results count as if their pictures were taken when they came.",
+                "RoadClass_Age is not available: the time of arrival is taken as the time of the picture.",
             )
         classes = []
         for side in self._side_names:

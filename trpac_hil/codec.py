@@ -307,7 +307,7 @@ def _require_single(message: Message, all_messages: Iterable[Message]) -> None:
     alike = [m for m in all_messages if (m.frame_id, m.is_extended_frame) == key or m.name == message.name]
     if len(alike) > 1:
         others = ", ".join(f"{quoted(m.name)} 0x{m.frame_id:X}" for m in alike)
-        raise ValueError(f"its name or its identifier is there twice: {others}")
+        raise ValueError(f"its name or its identifier occurs twice: {others}")
 
 
 def _tried(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 
 from cantools.database.can import Message, Signal
@@ -13,13 +14,18 @@ from trpac_hil.message import NOT_AVAILABLE, STALE_AFTER
 TARGET = Path(__file__).parent.parent / "docs" / "reference" / "bus_messages.md"
 _HEAD = """# Messages of `trpac hil`
 
-Written by `python -m trpac_hil.dbc_table` from `trpac_hil/trpac.dbc`; do not edit. How they are used: [hil.md](hil.md).
+Generated from `trpac_hil/trpac.dbc`. How they are used: [guide](../guide/bus.md).
 
-Classic CAN, 11-bit identifiers, 8 bytes, Intel byte order; a CAN FD bus may fill them up. "Stale after" is the age
-beyond which the rig takes a signal for lost. A message that comes more often than its cycle time for long has two
-senders, unless its counter goes on by one each time: its signals then count as lost, and `Status` is 2 until 1 s after
-the last sign of it.
+Classic CAN, 11-bit identifiers, 8 bytes, Intel byte order. On CAN FD the messages may be filled up. "Lost after" is the
+age beyond which the signals of a message count as lost. A message whose counter stands still counts as old. A message
+that comes for long more often than its cycle time has two senders, unless its counter goes up by one each time: its
+signals then count as lost until 1 s after the last sign of it.
+
+In the tables, "bits" are start bit and length; `u` is unsigned, `i` signed. "N/A" is the raw value that means "not
+available".
 """
+_WHEEL_OR_SIDE = re.compile(r"_(FL|FR|RL|RR|Left|Right)$")
+_WHEEL_OR_SIDE_WORDS = re.compile(r"\b((front|rear) )?(left|right) ")
 
 
 def document() -> str:
@@ -29,28 +35,43 @@ def document() -> str:
 
 
 def _section(message: Message) -> str:
-    rows = "\n".join(_row(signal) for signal in message.signals)
-    heading = f"## {message.name}, 0x{message.frame_id:X}, sent by {' '.join(message.senders)}"
+    groups: dict[str, list[Signal]] = {}
+    for signal in message.signals:
+        groups.setdefault(_WHEEL_OR_SIDE.sub("_", signal.name), []).append(signal)
+    rows = "\n".join(_row(group) for group in groups.values())
+    limits = {
+        str(s.dbc.attributes[STALE_AFTER].value)
+        for s in message.signals
+        if s.dbc and STALE_AFTER in s.dbc.attributes
+    }
+    lost = f", lost after {', '.join(sorted(limits))} ms" if limits else ""
     return (
-        f"\n{heading}\n\n{message.comment}. Cycle time {message.cycle_time} ms.\n\n"
-        "| signal | bits | unit | scale | range | stale after | meaning |\n|---|---|---|---|---|---|---|\n"
+        f"\n## {message.name}, 0x{message.frame_id:X}\n\n"
+        f"{message.comment}. Sent by {' '.join(message.senders)}; cycle time {message.cycle_time} ms{lost}.\n\n"
+        "| signal | bits | unit | scale | range | N/A | meaning |\n|---|---|---|---|---|---|---|\n"
         f"{rows}\n"
     )
 
 
-def _row(signal: Signal) -> str:
-    attributes = signal.dbc.attributes if signal.dbc else {}
-    stale = f"{attributes[STALE_AFTER].value} ms" if STALE_AFTER in attributes else ""
-    named = ", ".join(
-        f"{raw}: {str(name).replace(NOT_AVAILABLE, 'not available')}"
-        for raw, name in (signal.choices or {}).items()
-    )
-    sign = "i" if signal.is_signed else "u"
-    meaning = f"{signal.comment} ({named})" if named else f"{signal.comment}"
+def _row(group: list[Signal]) -> str:
+    """A row for a signal, or for those of all wheels or sides, which differ in their start bits only."""
+    first = group[0]
+    names = ", ".join(f"`{s.name}`" if s is first else f"`{_suffix(s)}`" for s in group)
+    values = {raw: str(name) for raw, name in (first.choices or {}).items()}
+    missing = ", ".join(f"{raw}" for raw, name in values.items() if name == NOT_AVAILABLE)
+    named = ", ".join(f"{raw} {name}" for raw, name in values.items() if name != NOT_AVAILABLE)
+    meaning = first.comment if len(group) == 1 else _WHEEL_OR_SIDE_WORDS.sub("", f"{first.comment}")
+    starts = ", ".join(f"{s.start}" for s in group)
+    sign = "i" if first.is_signed else "u"
     return (
-        f"| `{signal.name}` | {signal.start}, {sign}{signal.length} | {signal.unit or ''} | {signal.scale:g} | "
-        f"{signal.minimum:g} ... {signal.maximum:g} | {stale} | {meaning} |"
+        f"| {names} | {starts}; {sign}{first.length} | {first.unit or ''} | {first.scale:g} | "
+        f"{first.minimum:g} ... {first.maximum:g} | {missing} | {meaning}{f': {named}' if named else ''} |"
     )
+
+
+def _suffix(signal: Signal) -> str:
+    found = _WHEEL_OR_SIDE.search(signal.name)
+    return found.group(0) if found else signal.name
 
 
 if __name__ == "__main__":

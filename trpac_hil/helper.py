@@ -52,7 +52,7 @@ class Control:
             if not process.is_alive():
                 break
             time.sleep(0.02)
-        raise HilError(f"The process of the {self.name} did not start; its own words are above.")
+        raise HilError(f"The process of the {self.name} did not start; its error message is above.")
 
     def start(self, start_ns: int) -> None:
         """Set the time at which slot 0 begins."""

@@ -175,7 +175,7 @@ class Inputs:
             values, count = heard.coded.decode(data, outside)
         except ValueError as error:
             heard.broken += 1
-            self._report(f"broken {name}", f"A message was left aside: {quoted(error)}")
+            self._report(f"broken {name}", f"A message was ignored: {quoted(error)}")
             return ""
         ahead, went_on, odd = 1, False, False
         if self._counters and count >= 0 and heard.count >= 0:
@@ -189,13 +189,14 @@ class Inputs:
             self._report(
                 f"two senders {name}",
                 f"{name}: {seen}, so two devices send it. TRPAC is held with flag 0 until "
-                f"{HELD_NS * 1e-9:g} s after the last sign of it. Take one off the bus, or correct its cycle time.",
+                f"{HELD_NS * 1e-9:g} s after the last sign of it. Remove one from the bus, or correct the "
+                "cycle time in the DBC file.",
             )
         if ahead == 0:
             heard.frozen += 1
             self._report(
                 f"frozen {name}",
-                f"{name}: its counter stood still at {count}, so the message is old news. "
+                f"{name}: its counter stays at {count}, so the message counts as old. "
                 "A sender that does not count needs --no-counters.",
             )
             return ""

@@ -215,7 +215,7 @@ class Loop:
             self.counts.discarded += 1
             self._events.report(
                 "discarded",
-                "The unit discarded a step: the last estimate is held with flag 0, and the loop goes on.",
+                "The unit discarded a step: the last estimate is held with flag 0, and the loop continues.",
             )
             return HELD_UNIT
         if self._missing(readings):
@@ -267,7 +267,8 @@ class Loop:
                 self.counts.clock_jumps += 1
                 self._events.report(
                     "clock jump",
-                    f"The wall clock was set by {jump_ns * 1e-9:+.3f} s. The loop runs by another clock and goes on.",
+                    f"The wall clock was set by {jump_ns * 1e-9:+.3f} s. The loop uses another clock and is not "
+                    "affected.",
                 )
         if now_ns >= self._next_health_ns:
             self._next_health_ns = now_ns + HEALTH_EVERY_NS

@@ -187,7 +187,7 @@ class Coded:
         """
         by_name = {signal.name: signal for signal in message.signals}
         if len(by_name) < len(message.signals):
-            raise ValueError("a signal is there twice")
+            raise ValueError("a signal occurs twice")
         counting = _counter(by_name, counter)
         signals = tuple(name for name in by_name if name in used and name != counting)
         cycle_ns = _whole_ms(message.cycle_time, "its cycle time") if message.cycle_time else 0
@@ -340,7 +340,7 @@ def _selectors(signal: Signal, message: Message) -> tuple[tuple[str, frozenset[i
     found: list[tuple[str, frozenset[int]]] = []
     while signal.multiplexer_ids:
         if len(found) > len(message.signals) or signal.multiplexer_signal is None:
-            raise ValueError(f"{signal.name} has no multiplexer, or one in a circle")
+            raise ValueError(f"{signal.name} has no multiplexer, or a circular one")
         found.insert(0, (signal.multiplexer_signal, frozenset(signal.multiplexer_ids)))
         signal = message.get_signal_by_name(signal.multiplexer_signal)
     return tuple(found)

@@ -202,7 +202,7 @@ class _Listened:
             return "not checked"
         if heard.frozen >= heard.received - 1:
             return "stands still"
-        return f"{heard.lost} missing" if heard.lost else "goes on"
+        return f"{heard.lost} missing" if heard.lost else "counts"
 
     def _problem(self, heard: Heard, signal: str) -> str:
         """Why a signal has no value; empty where it has one."""

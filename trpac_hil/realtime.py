@@ -55,7 +55,7 @@ def memory_mb() -> float | None:
 def raise_priority() -> str:
     """Ask for real-time priority; returns the outcome as a sentence."""
     if not hasattr(os, "sched_setscheduler"):
-        return "real-time priority: this system has none that can be asked for here"
+        return "real-time priority: not available on this system"
     try:
         # Threads that start later inherit it: a preempted thread that holds the interpreter would delay the loop.
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
@@ -105,7 +105,7 @@ def loop_core(asked: int | None, realtime: bool) -> int | None:
 def pin(core: int) -> str:
     """Run this process on one core alone; returns the outcome as a sentence."""
     if not hasattr(os, "sched_setaffinity"):
-        return "core: this system cannot pin a process here"
+        return "core: not available on this system"
     try:
         os.sched_setaffinity(0, {core})
     except OSError as error:

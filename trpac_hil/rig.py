@@ -125,7 +125,8 @@ class Rig:
             if control.name not in self.dead and not process.is_alive():
                 self.dead.append(control.name)
                 events.report(
-                    f"dead {control.name}", f"The process of the {control.name} has died: the run ends."
+                    f"dead {control.name}",
+                    f"The process of the {control.name} ended unexpectedly: the run ends.",
                 )
         return bool(self.dead)
 
@@ -271,7 +272,7 @@ def _run(
         counts = loop.run(stopper, slots)
         over.set()
         after_mb = memory_mb()
-        ended = "asked to stop" if stopper.asked else "time was up"
+        ended = "a stop was requested" if stopper.asked else "the set duration is over"
         if rig.dead:
             ended = f"the process of the {' and of the '.join(rig.dead)} died"
         answers = rig.end(recorder)

@@ -113,7 +113,7 @@ class Resolver:
             why = (
                 "integrate is for logs, not for a bus"
                 if spec.copy_of is None
-                else f"copies {quoted(spec.copy_of)}, which no line says where to find"
+                else f"copies {quoted(spec.copy_of)}, for which there is no line"
             )
             self._blame(role, f"{why}; expected a signal, {{column: Message.Signal}}.")
             return 0.0, []

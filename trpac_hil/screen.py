@@ -86,7 +86,7 @@ def readiness_table(readiness: Readiness) -> RenderableType:
     for heading in ("quantity", "value", "unit", "from", "id", "1/s", "counter", "state"):
         table.add_column(heading, justify="right" if heading in ("value", "1/s") else "left")
     for line in readiness.lines:
-        state = line.problem or "there"
+        state = line.problem or "ok"
         style = "" if not line.problem else "red" if line.required else "dim"
         if line.problem and not line.required:
             state = f"{state} (optional)"

@@ -178,7 +178,7 @@ class Unit:
         for number in range(WARM_UP_STEPS):
             self.give_class([(0, 0.9)] * len(self.wiring.sides), number + 1)
             if not self.step(1e-3 * number, 1e-3, references, values):
-                raise HilError(f"{self.archive}: refuses the settings; its own words are above.")
+                raise HilError(f"{self.archive}: refuses the settings; its error message is above.")
 
     @property
     def _instance(self) -> FMU2Slave:

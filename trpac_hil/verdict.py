@@ -9,7 +9,7 @@ CAUSES = {
     "own_work": "the loop's own work took so long",
     "other_work": "the processor was given to other programs",
     "waiting": "the loop was blocked, as by a thread of its own process",
-    "machine": "the machine stood still (the host of a virtual machine, firmware)",
+    "machine": "the whole machine was paused (host of a virtual machine, firmware)",
     "untold": "the cause is not known on this system",
 }
 """What the causes of `trpac_hil.delays` mean."""
@@ -46,7 +46,7 @@ def _deadlines(summary: Mapping[str, Any]) -> str:
     share = (
         ""
         if number == late
-        else f"{'most' if 2 * number > late else 'the greatest part'} ({number:,}) of them "
+        else f"{'most' if 2 * number > late else 'the largest part'} ({number:,}) of them "
     )
     return f"{text}; {late:,} by more than 5 ms, {share}because {CAUSES[cause]}."
 
@@ -82,7 +82,7 @@ def _bus(bus: Mapping[str, Any]) -> str:
         "losses": "times lost",
         "unsent": "messages could not be sent",
         "error_frames": "error frames",
-        "garbled": "frames that were no messages",
+        "garbled": "packets that were no CAN messages",
     }
     found = [f"{bus[kind]:,} {text}" for kind, text in words.items() if bus[kind]]
     return f"Bus: {', '.join(found) or 'never lost'}."

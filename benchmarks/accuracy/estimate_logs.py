@@ -1,6 +1,6 @@
 """How far off are the estimator, DE and the peers on logs that others made, where the true peak friction is known?
 
-    python -m benchmarks.accuracy.estimate_logs DIR [--write docs/guide/estimate.md]
+    python -m benchmarks.accuracy.estimate_logs DIR [--write lab/2026-11-29_estimates_on_foreign_logs.md]
 
 DIR is the folder that holds vehicle_logs/. With --write the tables between the markers of that document are replaced.
 All wheels count row by row. One clock for all: the rows in which DE's excitation flag is up at the wheel.
@@ -47,7 +47,7 @@ PLANTS = {
 ELASTIC_SLIP = (0.002, 0.01)
 """Slips between which a simulator's own stiffness is read from its truth [-]."""
 CAMERA_PERIOD_S = 0.05
-CLASSES = "DIFE, right classes"
+CLASSES = f"{OURS}, right classes"
 
 BMW_LOG = "bmw_m8_roadview/accel_coast_absbrake.csv"
 BMW_PEAK = 1.15
@@ -150,7 +150,7 @@ def _ucd_vehicle() -> VehicleFile:
 
 
 def with_classes(d: Drive) -> Replay:
-    """DIFE with a camera that is always right: the class nearest to the truth, from a preview distance ahead."""
+    """Our estimator with a camera that is always right: the class nearest to the truth, a preview distance ahead."""
     preview = PreviewConfig()
     place = np.nan_to_num(d.inputs.position_m)
     every = max(round(CAMERA_PERIOD_S / d.inputs.step_s), 1)
@@ -186,7 +186,7 @@ def measure(drives: Iterator[Drive]) -> Iterator[dict]:
         print(f"{d.log}, {d.car}: {len(d.inputs)} rows", file=sys.stderr, flush=True)
         done = replay(d.inputs, peers=True)
         clock, seen = done.traces[DYNAMICS].excited, done.seen
-        yield judged(d, "DE = DIFE, no camera", done.traces[OURS], clock, seen)
+        yield judged(d, f"{OURS}, no camera", done.traces[OURS], clock, seen)
         for name in PEER_NAMES:
             yield judged(d, name, done.traces[name], clock, seen)
         fused = with_classes(d)

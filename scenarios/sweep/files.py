@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from scenarios.errors import ScenarioError, suggestion
 from scenarios.files import Scenario, SurfaceName, load_scenario
-from scenarios.library import located
+from scenarios.library import located, shipped
 from scenarios.strict import load_strict
 from scenarios.sweep.trackers import ADDRESS, problem_of_address, problem_of_tracker
 from trpac_core.files import quoted
@@ -163,7 +163,7 @@ class Axis(_Section):
 
 
 class SweepFile(_Section):
-    """The content of sweep.yaml; the scenario's path is relative to it."""
+    """The content of sweep.yaml; the scenario is a shipped one's name, or a path relative to the file."""
 
     schema_: Literal[1] = Field(alias="schema")
     name: Annotated[str, Field(max_length=200)]
@@ -309,7 +309,8 @@ def load_sweep(path: str | Path, *, allow_code: bool = False) -> Sweep:
             "you trust the file: --allow-code."
         )
     try:
-        scenario = load_scenario(path.parent / file.scenario)
+        named = file.scenario in shipped("scenario")
+        scenario = load_scenario(file.scenario if named else path.parent / file.scenario)
     except ScenarioError as error:
         raise ScenarioError(f"{quoted(path)}: scenario: {error}") from error
     problems = [f"{quoted(path)}: {text}" for name in addresses if (text := problem_of_address(name))]

@@ -192,7 +192,7 @@ def _culprit(ratio: float, slope: float) -> str:
     by = {name: float(seen @ side / np.dot(side, side)) for name, side in sides.items()}
     left = {name: float(np.linalg.norm(seen - by[name] * np.array(side))) for name, side in sides.items()}
     name = min(left, key=lambda n: left[n])
-    return f"{name} looks about {np.exp(by[name]):.2g} times as large as it is, "
+    return f"{name} looks about {np.exp(by[name]):.2g} times too large, "
 
 
 def _check_torques(signals: Mapping[str, Array]) -> Iterator[Finding]:
@@ -205,7 +205,8 @@ def _check_torques(signals: Mapping[str, Array]) -> Iterator[Finding]:
         if slope is not None and not 1.0 / FACTOR <= slope <= FACTOR:
             what = "has the other sign than" if slope < 0.0 else f"is {slope:.3g} times"
             yield Finding(
-                f"{names[0]} {what} {names[1]} all along; is a unit, a scale or a sign wrong?", fatal=False
+                f"{names[0]} {what} {names[1]} in the whole log; is a unit, a scale or a sign wrong?",
+                fatal=False,
             )
 
 

@@ -136,8 +136,8 @@ def check_held(time_s: Array, signals: Mapping[str, Array]) -> Iterator[Finding]
             f"{', '.join(name for name in rows if rows[name] == count)}: every value stands for {count:.3g} rows, "
             f"{count * step_ms:.3g} ms, as a recorder holds a message until the next one, or a counter shows its "
             "window. "
-            f"On average it is {0.5 * (count - 1.0) * step_ms:.3g} ms old, which a diagnosis may call a "
-            "delay. If the recorder did that, leave the repeated cells empty.",
+            f"On average it is {0.5 * (count - 1.0) * step_ms:.3g} ms old, which a diagnosis may report as a "
+            "delay. If the recorder repeated values, leave the repeated cells empty.",
             fatal=False,
         )
 

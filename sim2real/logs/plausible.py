@@ -121,7 +121,7 @@ def lost_samples(time_s: Array, signals: Mapping[str, Array]) -> tuple[dict[str,
             continue
         at = np.flatnonzero(lost)
         first = f"the first {signals[name][at[0]]:.6g} at {TIME} {time_s[at[0]]:.6g}"
-        text = f"{name}: {count} samples are no car's, {first}"
+        text = f"{name}: {count} samples are impossible for a car, {first}"
         if count > MOST_LOST * np.count_nonzero(np.isfinite(signals[name])):
             findings.append(Finding(f"{text}; expected at most {MOST_LOST:.0%} of such. Is its unit right?"))
             continue

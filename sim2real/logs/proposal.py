@@ -38,12 +38,12 @@ QUANTITY_WORDS = {
         "y z limit target wheel whl engine motor",
     ),
     "accel_x_m_s2": (
-        "ax accelx accel acc acceleration beschl beschleunigung",
+        "ax accelx accel acc acceleration beschl beschleunigung a",
         "x longitudinal long laengs",
         "y z lat lateral quer",
     ),
     "accel_y_m_s2": (
-        "ay accely accel acc acceleration beschl beschleunigung",
+        "ay accely accel acc acceleration beschl beschleunigung a",
         "y lateral lat quer",
         "x z long longitudinal",
     ),
@@ -101,7 +101,7 @@ def proposed_mapping(table: Table, file: str) -> str:
     """The text of a mapping file with the candidates of a table; what it could not find stands in comments."""
     chosen = candidates(table)
     lines = [
-        f"# Proposed for {file} by the names and units of its columns. Check every line: nothing of it is known.",
+        f"# Proposed for {file} by the names and units of its columns. Check every line: these are guesses.",
         "schema: 1",
         "columns:",
     ]

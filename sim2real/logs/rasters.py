@@ -121,8 +121,8 @@ def table_of(
         time_s = np.arange(time_s[0], time_s[-1], step)
         findings.append(
             Finding(
-                f"channel {base} comes unevenly: {uneven} of its samples are more than half a step ({500.0 * step:.3g} "
-                f"ms) off. All channels are interpolated onto an even {1.0 / step:.4g} Hz.",
+                f"channel {base} is sampled unevenly: {uneven} of its samples are more than half a step "
+                f"({500.0 * step:.3g} ms) off. All channels are interpolated onto an even {1.0 / step:.4g} Hz.",
                 fatal=False,
             )
         )

@@ -188,7 +188,7 @@ def labels_of(cells: Sequence[str]) -> Text:
 
 def read_as(notes: Sequence[str]) -> str:
     """How a file was understood, in one line."""
-    return "; ".join(notes) or "the plain form"
+    return "; ".join(notes) or "plain table"
 
 
 def and_more(count: int) -> str:

@@ -78,13 +78,13 @@ def camera_side(
     if camera is not None:
         if log.image_path is None or not (log.image_path != "").any():
             raise LogError(
-                f"{log.path}: has no column image_path; expected one with the pictures of the camera file, or the "
-                "command without a camera file."
+                f"{log.path}: has no column image_path; expected one with the names of the pictures, or the "
+                "command without --camera."
             )
         return _from_pictures(log, inputs, camera, models, told)
     side = _from_columns(log, inputs, vehicle)
     if log.image_path is not None and not side.left:
-        text = "image_path: the pictures are not used, since no camera file was given (--camera)."
+        text = "image_path: the pictures are not used, because no camera file was given (--camera)."
         return CameraSide(side.source, {}, {}, side.preview, (*side.warnings, text))
     return side
 
@@ -100,7 +100,7 @@ def _from_columns(log: Log, inputs: Inputs, vehicle: VehicleFile) -> CameraSide:
         return CameraSide("none", {}, {}, PreviewConfig(), warnings)
     known = np.isfinite(results.confidence)
     if not known.any():
-        text = "image_class: not used, since no image_confidence says which classes are to be trusted."
+        text = "image_class: not used, because the column image_confidence is missing."
         return CameraSide("none", {}, {}, PreviewConfig(), (*warnings, text))
     front_m = inputs.position_m + inputs.vehicle.cog_to_front_axle_m
     arrived = np.searchsorted(inputs.time_s, results.time_s[known] - 1e-9)

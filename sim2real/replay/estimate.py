@@ -65,7 +65,9 @@ def estimate_log(
         read, inputs, car, lens, networks_folder(), lambda done, total: told("pictures", done, total)
     )
     done = replay(inputs, seen, peers, told, method)
-    assumed = (f"no vehicle file was given: the car is taken to be {car.name} of {TABLE_3.name}.",)
+    assumed = (
+        f"no vehicle file was given (--vehicle): the car is assumed to be {car.name} of {TABLE_3.name}.",
+    )
     summary = {
         "schema": 1,
         "log": {

@@ -223,9 +223,11 @@ def _warnings(log: Log, locked: NDArray[np.bool_], step_s: float) -> tuple[str, 
         said.append(
             "wheels lock for "
             + ", ".join(f"{s:.1f} s ({w})" for w, s in zip(WHEELS, locked_s, strict=True) if s)
-            + ": a brake then holds what the road gives, not the torque in the log, and the estimate is held."
+            + ": the brake torque of a locked wheel is not its tyre torque, so the estimate is held."
         )
     constant = sorted(name for name in log.derived if name.startswith("wheel_torque"))
     if constant:
-        said.append(f"{', '.join(constant)}: not measured, so nothing of the road can be seen at that wheel.")
+        said.append(
+            f"{', '.join(constant)}: not measured, so there is no estimate from tyre forces at that wheel."
+        )
     return tuple(said)

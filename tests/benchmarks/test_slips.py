@@ -34,13 +34,13 @@ def test_each_slip_is_named_by_its_column(logs):
 @pytest.mark.parametrize(
     ("column", "factor", "said"),
     [
-        ("time_s", 1.6, "time_s looks about 1.6 times as large as it is"),
+        ("time_s", 1.6, "time_s looks about 1.6 times too large"),
         ("vehicle_speed_m_s", 1.6, "vehicle_speed_m_s looks about 1.6 times"),
         ("position_m", 0.6, "position_m looks about 0.6 times"),
         ("accel_x_m_s2", 1.6, "accel_x_m_s2 looks about 1.7 times"),
         ("wheel_speed_rl_rad_s", 1.5, "wheel_speed_rl_rad_s is 1.5 times the other wheels' speed"),
         ("wheel_torque_fr_nm", -1.0, "wheel_torque_fl_nm has the other sign than wheel_torque_fr_nm"),
-        ("wheel_torque_rr_nm", 2.0, "wheel_torque_rl_nm is 0.5 times wheel_torque_rr_nm all along"),
+        ("wheel_torque_rr_nm", 2.0, "wheel_torque_rl_nm is 0.5 times wheel_torque_rr_nm in the whole log"),
     ],
 )
 def test_the_column_that_is_off_is_told_from_those_that_agree(logs, column, factor, said):

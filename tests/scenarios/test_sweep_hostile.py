@@ -212,7 +212,8 @@ def make_certificates(folder: Path) -> Certificates:
     """As docs/guide/sweep.md says."""
     folder.mkdir()
     made = Certificates(folder / "ca.pem", folder / "dask.pem", folder / "dask-key.pem")
-    recipe = (ROOT / "docs" / "guide" / "sweep.md").read_text().split("```sh\n")[1].split("```")[0]
+    page = (ROOT / "docs" / "guide" / "sweep.md").read_text(encoding="utf-8")
+    recipe = next(p for p in page.split("```bash\n")[1:] if p.startswith("umask")).split("```")[0]
     subprocess.run(["/bin/sh", "-e", "-c", recipe], cwd=folder, check=True, capture_output=True)
     return made
 

@@ -270,7 +270,7 @@ class TestCamera:
     def test_classes_without_confidence_are_left_out_and_said(self, with_classes, tmp_path):
         _, side = self.side(with_classes.drop(columns="image_confidence"), tmp_path)
         assert side.left == {}
-        assert "no image_confidence" in " ".join(side.warnings)
+        assert "column image_confidence is missing" in " ".join(side.warnings)
 
     def test_pictures_are_classified_and_a_damaged_one_is_said(self, with_classes, tmp_path):
         log = with_classes.iloc[:300].copy()

@@ -136,8 +136,7 @@ def test_frames_of_a_wrong_length_are_left_aside(tmp_path, frame, mapping):
     short.data, short.dlc = short.data[:6], 6
     log = read_log(write(tmp_path / "log.log", frames), mapping, described(tmp_path))
     assert (
-        "message Wheels: 1 of 301 frames have 6 bytes; 8 by the DBC file. They are left aside."
-        in log.warnings
+        "message Wheels: 1 of 301 frames have 6 bytes; 8 by the DBC file. They are ignored." in log.warnings
     )
     assert len(log) == 300
     with pytest.raises(
@@ -224,7 +223,9 @@ def test_one_id_on_two_channels(tmp_path, frame, mapping):
 
 def test_a_name_of_two_signals_is_asked_for(tmp_path, frame):
     path, dbc = write(tmp_path / "log.blf", frames_of(frame)), described(tmp_path)
-    with pytest.raises(LogError, match=r"signal Speed is several: Motion\.Speed \(car\.dbc\), Other\.Speed"):
+    with pytest.raises(
+        LogError, match=r"signal Speed stands for several: Motion\.Speed \(car\.dbc\), Other\.Speed"
+    ):
         read_log(path, mapped(tmp_path, vehicle_speed_m_s="Speed"), dbc)
 
 

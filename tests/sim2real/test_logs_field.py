@@ -357,7 +357,7 @@ class TestLostSamples:
         assert not any("lost" in text for text in log.warnings)
 
     def test_a_signal_that_is_impossible_for_long_is_refused(self, drive):
-        with pytest.raises(LogError, match="accel_x_m_s2: 400 samples are no car's"):
+        with pytest.raises(LogError, match="accel_x_m_s2: 400 samples are impossible for a car"):
             trpac.read_log(drive.assign(accel_x_m_s2=np.where(TIME_S < 2.0, 500.0, drive["accel_x_m_s2"])))
 
 

@@ -247,7 +247,7 @@ class TestFileProblems:
 
 def test_the_document_is_true(mapping):
     page = (Path(__file__).parents[2] / "docs" / "guide" / "logs.md").read_text(encoding="utf-8")
-    stated, example, bus = (mapping(text) for text in re.findall(r"```yaml\n(.*?)```", page, re.DOTALL))
+    example, stated, bus = (mapping(text) for text in re.findall(r"```yaml\n(.*?)```", page, re.DOTALL))
     assert bus.sources("vehicle_speed_m_s") == ["Esp.VehSpd"]
     assert len(example.columns) == 9
     assert stated.format.encoding == "cp1252"

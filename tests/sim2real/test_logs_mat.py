@@ -107,7 +107,7 @@ def test_the_fields_of_a_struct(tmp_path, frame, save):
         read_log(path)
     (tmp_path / "bare.yaml").write_text("vehicle_speed_m_s: v\n")
     with pytest.raises(
-        LogError, match=r"variable v is several: old\.v, run\.v; expected one of these in a mapping"
+        LogError, match=r"variable v stands for several: old\.v, run\.v; expected one of these in a mapping"
     ):
         read_log(path, load_mapping(tmp_path / "bare.yaml"))
     (tmp_path / "map.yaml").write_text("vehicle_speed_m_s: run.v\n")

@@ -98,7 +98,7 @@ def test_a_raster_without_a_clock_comes_onto_an_even_rate(tmp_path, frame):
             mdf.append(Signal(frame[name].to_numpy(), time_s, name=name))
         mdf.save(tmp_path / "log.mf4")
     log = read_log(tmp_path / "log.mf4")
-    assert "channel wheel_speed_fl_rad_s comes unevenly" in log.warnings[0]
+    assert "channel wheel_speed_fl_rad_s is sampled unevenly" in log.warnings[0]
     assert np.ptp(np.diff(log.time_s)) < 1e-9
     assert log.rate_hz == pytest.approx(100.0, rel=0.01)
     assert np.allclose(

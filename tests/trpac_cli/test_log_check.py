@@ -37,7 +37,7 @@ def test_a_plain_log_is_fit(frame, tmp_path):
     done = run("log", "check", save(frame, tmp_path / "log.csv"))
     assert done.exit_code == 0
     text = words(done.output)
-    assert "301 rows, read as: the plain form" in text
+    assert "301 rows, read as: plain table" in text
     assert "For trpac estimate: usable." in text
     assert "For trpac gap diagnose: usable." in text
 

@@ -330,7 +330,7 @@ def test_a_signal_that_is_missing_is_named_also_where_its_table_of_values_is_sti
         ([], [("counters:", "checksums: {Motion: Crc}\ncounters:")], "checksums"),
         ([], [("Motion: AliveCnt", "Motion: VehSpd")], "VehSpd does not count by one from 0"),
         ([("BO_ 700 ", "BO_ 512 ")], [], "Estimate is sent with the identifier 0x200 of trpac.dbc, which is that of"),
-        ([("BO_ 701 Brakes", "BO_ 700 Brakes")], [], "is there twice: Drive 0x2BC, Brakes 0x2BC"),
+        ([("BO_ 701 Brakes", "BO_ 700 Brakes")], [], "occurs twice: Drive 0x2BC, Brakes 0x2BC"),
         ([("BO_ 900 Health", "BO_ 900 Drive")], [], "Drive cannot be used"),
         ([("(0.001,0) [-4|4]", "(0,0) [-4|4]")], [], "Motion cannot be used"),
         ([("VehSpd 65535", "VehSpd 165535")], [], "Motion cannot be used"),
@@ -510,7 +510,7 @@ def test_when_all_is_there_it_begins_after_rates_were_counted(tmp_path: Path) ->
     assert 0.3 <= readiness.listened_s < 0.4
     lines = {line.name: line for line in readiness.lines}
     speed = lines["vehicle_speed_m_s"]
-    assert (speed.source, speed.frame_ids, speed.counter) == ("Motion.VehSpd x 0.2778", "0x3E9", "goes on")
+    assert (speed.source, speed.frame_ids, speed.counter) == ("Motion.VehSpd x 0.2778", "0x3E9", "counts")
     assert speed.value == pytest.approx(10.0 / 3.6)
     assert speed.rate in ("99 of 100", "100 of 100", "101 of 100")
     torque = lines["wheel_torque_fl_nm"]
@@ -600,7 +600,7 @@ def summary_of(**changes: object) -> dict[str, object]:
     bus = {"messages": {}, "required": [], "losses": 0, "unsent": 0, "error_frames": 0, "garbled": 0}
     log = {"file": "log.mf4", "rows": 100, "rows_lost": 0, "problem": None}
     plain = {
-        "ended": "time was up",
+        "ended": "the set duration is over",
         "cycles": 100,
         "held_cycles": 0,
         "starting_cycles": 0,
@@ -611,7 +611,7 @@ def summary_of(**changes: object) -> dict[str, object]:
 
 def test_the_verdict_says_in_words_what_was_kept_and_what_was_not() -> None:
     assert verdict(summary_of()) == [
-        "Ended: time was up.",
+        "Ended: the set duration is over.",
         "Deadlines kept: yes, all 100.",
         "Estimate: live in 100 % of the cycles.",
         "Inputs: all came, none was lost.",
@@ -812,6 +812,6 @@ def test_ctrl_c_while_it_waits_ends_it_with_a_summary_of_no_cycles(unit_file: Pa
     threading.Timer(1.0, stopper.ask).start()
     bus = BusSettings("virtual", "waits")
     summary = run_hil(HilSettings(tmp_path / "out", unit_file, bus=bus, rate_hz=100.0, wait_s=600.0), stopper)
-    assert (summary["ended"], summary["cycles"]) == ("asked to stop", 0)
+    assert (summary["ended"], summary["cycles"]) == ("a stop was requested", 0)
     assert summary["verdict"][1:3] == ["Deadlines: none, no cycle ran.", "Estimate: none, no cycle ran."]
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["summary.json"]

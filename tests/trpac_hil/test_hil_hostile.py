@@ -93,7 +93,7 @@ def test_a_datagram_that_is_no_message_is_left_aside_and_the_rest_is_read_in_the
     assert len(link.receive()) == 2
     assert (link.up, link.losses, link.garbled, link.backlogs) == (True, 0, 3, 0)
     assert {kind for kind, _ in said} == {"garbled"}
-    assert "left aside" in said[0][1]
+    assert "is ignored" in said[0][1]
 
 
 def test_a_flood_of_garbage_holds_a_cycle_up_for_no_more_than_so_many_reads(link: Link) -> None:
@@ -405,7 +405,7 @@ def test_the_loop_holds_with_flag_0_while_two_send_and_goes_on_afterwards(name: 
     assert set(status[2200:]) == {RUNNING}
     assert set(bench.sent("Flag")[first:1750]) == {0.0}
     assert bench.events.kinds[f"two senders {name}"].count == 1
-    assert "Take one off the bus" in bench.events.kinds[f"two senders {name}"].text
+    assert "Remove one from the bus" in bench.events.kinds[f"two senders {name}"].text
 
 
 # Lengths

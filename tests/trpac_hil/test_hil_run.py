@@ -202,7 +202,7 @@ def test_ctrl_c_ends_cleanly_with_the_log_written(unit_file: Path, tmp_path: Pat
     assert process.returncode == 0, errors
     assert "Traceback" not in errors
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert summary["ended"] == "asked to stop"
+    assert summary["ended"] == "a stop was requested"
     assert summary["log"]["rows"] == summary["cycles"] > 0
     assert str(summary["cycles"]) in output
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["log.mf4", "summary.json"]

@@ -102,8 +102,8 @@ class Catalogue:
             if len(meant) > 1:
                 several = ", ".join(f"{each.name} ({quoted(each.source.name)})" for each in meant)
                 problems.append(
-                    f"signal {quoted(plain)} is several: {several}; expected a mapping with one of these names, or DBC "
-                    "files without the others."
+                    f"signal {quoted(plain)} stands for several: {several}; expected a mapping with one of these, "
+                    "or DBC files without the others."
                 )
             elif meant:
                 found[name] = meant[0], channel
@@ -161,7 +161,7 @@ def decoded(
             f"{message.length} by the DBC file"
         )
         findings.append(
-            Finding(f"{text}.") if not right.any() else Finding(f"{text}. They are left aside.", fatal=False)
+            Finding(f"{text}.") if not right.any() else Finding(f"{text}. They are ignored.", fatal=False)
         )
     rows: list[list[int]] = [[] for _ in signals]
     raws: list[list[float]] = [[] for _ in signals]

@@ -287,7 +287,7 @@ def _row_numbers(path: Path, dialect: Dialect, found: _Found) -> tuple[NDArray[n
             ) from error
     if len(rows) != found.rows:
         raise LogError(
-            f"{quoted(path)}: its rows cannot be told apart; expected one line per sample without stray quotes."
+            f"{quoted(path)}: its rows cannot be separated; expected one line per sample without stray quotes."
         )
     findings = []
     if rows and ragged and not found.ends and ragged[-1][0] > rows[-1] and ragged[-1][1] < width:

@@ -118,7 +118,8 @@ def _channel(found: Extract, said: dict[str, Any]) -> Channel:
 def _several(found: Extract) -> list[Finding]:
     return [
         Finding(
-            f"variable {quoted(name)} is several: {', '.join(map(quoted, full))}; expected one of these in a mapping."
+            f"variable {quoted(name)} stands for several: {', '.join(map(quoted, full))}; expected one of these "
+            "in a mapping."
         )
         for name, full in found.told["several"].items()
     ]
