@@ -54,9 +54,13 @@ compiled: $(READY)
 collected: $(READY)
 	@$(BIN)/python -m pytest -q --collect-only >/dev/null || true  # else each worker would rewrite all assertions; what is wrong the suite tells
 
+# Notebooks start in an empty folder, lest their files lie among the documents, and are run anew.
+site: NOTEBOOK_START := $(CURDIR)/out/notebook_start
 site: $(READY)   ## the site into out/site, its notebooks run, its links checked
 	@echo "building the site"
-	@mkdir -p out; NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict >out/site.log 2>&1 || { cat out/site.log; exit 1; }
+	@rm -rf .cache/mkdocs-jupyter $(NOTEBOOK_START); mkdir -p $(NOTEBOOK_START)/profile_default/startup
+	@echo 'import os, tempfile; os.chdir(tempfile.mkdtemp(prefix="trpac_notebook_"))' > $(NOTEBOOK_START)/profile_default/startup/folder.py
+	@IPYTHONDIR=$(NOTEBOOK_START) NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict >out/site.log 2>&1 || { cat out/site.log; exit 1; }
 
 format: $(READY) ## rewrite the sources in the house format
 	$(BIN)/ruff check --fix .
