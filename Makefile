@@ -35,7 +35,7 @@ test:            ## lint, types and the test suite
 test-all:        ## the same with the tests that take long (twice the time)
 test test-all: export OPENBLAS_NUM_THREADS = 1
 test test-all: $(READY) style
-	@$(MAKE) --no-print-directory -j 3 types compiled collected site
+	@$(MAKE) --no-print-directory -j 3 types compiled collected site TRPAC_SITE_NOTEBOOKS=false  # the tests run them
 	$(BIN)/python -m pytest -n 3 --dist loadfile --hypothesis-seed 0 $(CHOSEN)
 
 check: style types  ## lint and types
