@@ -1,4 +1,4 @@
-"""The figure of a brake onset: TRPAC with and without the camera along the road, and the stopping distances planned from it."""
+"""The figure of brake onsets: TRPAC with and without the camera along the road, and the planned stopping distances."""
 
 from __future__ import annotations
 

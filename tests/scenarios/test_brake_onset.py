@@ -78,6 +78,15 @@ def test_the_car_cruises_unexcited_onto_the_other_road_and_brakes_15_m_after_its
         np.testing.assert_allclose(getattr(elsewhere, part)[:row], getattr(trajectory, part)[:row], rtol=1e-6)
 
 
+def test_without_its_camera_a_drive_has_the_same_sensor_noise():
+    scenario = load_scenario("cruise_onto_snow")
+    trajectory = drive(scenario)
+    blind = replace(scenario, camera_path=None)
+    pd.testing.assert_frame_equal(
+        make_scenario_log(scenario, trajectory), make_scenario_log(blind, drive(blind))
+    )
+
+
 @pytest.mark.parametrize("name", CRUISES)
 def test_the_simulated_car_stops_a_little_later_than_the_road_allows(name):
     scenario = load_scenario(name)
