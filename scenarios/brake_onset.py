@@ -65,16 +65,16 @@ class Plan:
     ----------
     TRPAC, TRPAC_low, TRPAC_high : float
         The estimate and the ends of its 95 % interval [-].
-    stop_m, stop_low_m, stop_high_m : float
+    planned_stop_m, planned_stop_of_low_m, planned_stop_of_high_m : float
         Stopping distance planned from each; None where it is infinite [m].
     """
 
     TRPAC: float
     TRPAC_low: float
     TRPAC_high: float
-    stop_m: float | None
-    stop_low_m: float | None
-    stop_high_m: float | None
+    planned_stop_m: float | None
+    planned_stop_of_low_m: float | None
+    planned_stop_of_high_m: float | None
 
     @classmethod
     def of(cls, row: pd.Series, speed_m_s: float) -> Plan:
@@ -86,7 +86,7 @@ class Plan:
     @property
     def stop_text(self) -> str:
         """The planned distance in words."""
-        return "no stop" if self.stop_m is None else f"{self.stop_m:.0f} m"
+        return "no stop" if self.planned_stop_m is None else f"{self.planned_stop_m:.0f} m"
 
 
 @dataclass(frozen=True)

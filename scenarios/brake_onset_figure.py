@@ -88,7 +88,7 @@ def _along_the_road(axis: Axes, compared: Comparison) -> None:
 def _planned_stops(axis: Axes, onset: Onset) -> None:
     rows = [(s.label, getattr(onset, s.run), s) for s in SERIES]
     for y, (_, plan, series) in enumerate(rows):
-        stop_m = LONGEST_M if plan.stop_m is None else plan.stop_m
+        stop_m = LONGEST_M if plan.planned_stop_m is None else plan.planned_stop_m
         axis.barh(y, stop_m, color=series.colour, alpha=0.75, hatch=series.hatch, edgecolor="white")
         _interval(axis, y, plan)
     axis.barh(len(rows), onset.shortest_stop_m, color="#999999")
@@ -103,14 +103,14 @@ def _planned_stops(axis: Axes, onset: Onset) -> None:
 
 def _interval(axis: Axes, y: int, plan: Plan) -> None:
     """The interval's two planned distances beside a bar, with an arrow where one lies beyond the axis."""
-    start = 0.0 if plan.stop_high_m is None else plan.stop_high_m
-    beyond = plan.stop_low_m is None or plan.stop_low_m > LONGEST_M
-    end = LONGEST_M if beyond else float(plan.stop_low_m or 0.0)
+    start = 0.0 if plan.planned_stop_of_high_m is None else plan.planned_stop_of_high_m
+    beyond = plan.planned_stop_of_low_m is None or plan.planned_stop_of_low_m > LONGEST_M
+    end = LONGEST_M if beyond else float(plan.planned_stop_of_low_m or 0.0)
     axis.plot(
         [start, end], [y + 0.28] * 2, color=TRUTH, lw=1.4, marker="|", markevery=[0] if beyond else None
     )
     if beyond:
         axis.plot([LONGEST_M - 0.8], [y + 0.28], color=TRUTH, marker=">", ms=6)
-    far = "no stop" if plan.stop_low_m is None else f"{plan.stop_low_m:.0f} m"
+    far = "no stop" if plan.planned_stop_of_low_m is None else f"{plan.planned_stop_of_low_m:.0f} m"
     text = f"{plan.stop_text} ({start:.0f} to {far})"
     axis.text(LONGEST_M - 1, y - 0.1, text, ha="right", va="center", fontsize=12)

@@ -70,7 +70,7 @@ def onset_line(found: Sequence[Comparison], run: str) -> list[str]:
         spread([p.TRPAC for p in plans], 2),
         f"{np.median(low):.2f} to {np.median(high):.2f}",
         f"{held} of {len(plans)}",
-        spread([p.stop_m for p in plans], 0),
+        spread([p.planned_stop_m for p in plans], 0),
         f"{first.shortest_stop_m:.0f}",
     ]
 

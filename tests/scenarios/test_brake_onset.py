@@ -127,7 +127,7 @@ def test_with_the_right_class_trpac_is_nearer_to_the_road_before_the_tyre_shows_
     friction = load_scenario(name).road.segments[1].mu_left
     seen, blind = at_onset(name, True), at_onset(name, False)
     assert friction < seen.TRPAC < most < blind.TRPAC - 0.05
-    assert blind.stop_m < seen.stop_m < stopping_distance_m(15.0, friction)
+    assert blind.planned_stop_m < seen.planned_stop_m < stopping_distance_m(15.0, friction)
     for plan in (seen, blind):
         assert plan.TRPAC_low <= friction <= plan.TRPAC_high
 
@@ -182,7 +182,7 @@ def test_the_sentence_holds_both_runs_the_truth_and_the_plans():
 
 def test_the_summary_is_json_without_infinity():
     text = json.dumps(ONSET.summary(), allow_nan=False)
-    assert json.loads(text)["without_camera"]["stop_low_m"] is None
+    assert json.loads(text)["without_camera"]["planned_stop_of_low_m"] is None
 
 
 def test_the_figure_is_1200_pixels_wide_for_two_drives(tmp_path):

@@ -73,7 +73,7 @@ def test_the_report_begins_with_the_brake_onset(short_scenario, unit_file, tmp_p
     last = log[log["time_s"] <= 1.7 + 1e-9].iloc[-1]
     for name in ("TRPAC", "TRPAC_low", "TRPAC_high"):
         assert onset["with_camera"][name] == pytest.approx(last[name])
-    assert {"TRPAC", "TRPAC_low", "TRPAC_high", "stop_m"} <= set(onset["with_camera"])
+    assert {"TRPAC", "TRPAC_low", "TRPAC_high", "planned_stop_m"} <= set(onset["with_camera"])
     assert onset["simulated_stop_m"] > 0.9 * onset["shortest_stop_m"]
     report = (out / "report.html").read_text()
     assert report.count("data:image/") == 3
