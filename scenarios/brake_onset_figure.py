@@ -60,26 +60,26 @@ def draw_brake_onset(comparisons: Sequence[Comparison], path: Path) -> None:
 def _along_the_road(axis: Axes, compared: Comparison) -> None:
     table, onset = compared.table, compared.onset
     table = table[table["after_border_m"] >= FROM_M]
-    place_m = table["after_border_m"]
+    position_m = table["after_border_m"]
     for series in SERIES:
         low, high = (table[f"TRPAC_{end}_{series.run}"] for end in ("low", "high"))
-        axis.fill_between(place_m, low, high, color=series.colour, alpha=0.09, lw=0)
+        axis.fill_between(position_m, low, high, color=series.colour, alpha=0.09, lw=0)
         for edge in (low, high):
-            axis.plot(place_m, edge, color=series.colour, ls=series.dashes, lw=0.9, alpha=0.8)
+            axis.plot(position_m, edge, color=series.colour, ls=series.dashes, lw=0.9, alpha=0.8)
         axis.plot(
-            place_m,
+            position_m,
             table[f"TRPAC_{series.run}"],
             color=series.colour,
             ls=series.dashes,
             lw=2.6,
             label=series.label,
         )
-    axis.plot(place_m, table["theta_true"], color=TRUTH, lw=2.0, ls=":", label="true peak friction")
+    axis.plot(position_m, table["theta_true"], color=TRUTH, lw=2.0, ls=":", label="true peak friction")
     for x, text in ((0.0, "border"), (onset.after_border_m, "brake onset")):
         axis.axvline(x, color=GREY, lw=1.2)
         axis.text(x - 0.3, 0.97 * TOP, text, rotation=90, ha="right", va="top", color=GREY, fontsize=12)
     axis.fill_between([], [], [], color=GREY, alpha=0.25, label="95 % interval (thin lines)")
-    axis.set_xlim(float(place_m.iloc[0]), float(place_m.iloc[-1]))
+    axis.set_xlim(float(position_m.iloc[0]), float(position_m.iloc[-1]))
     axis.set_ylim(0.0, TOP)
     axis.set_xlabel("front wheel after the border [m]")
     axis.set_title(f"Dry road onto {onset.road}")

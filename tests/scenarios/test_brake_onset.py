@@ -186,8 +186,8 @@ def test_the_summary_is_json_without_infinity():
 
 
 def test_the_figure_is_1200_pixels_wide_for_two_drives(tmp_path):
-    place_m = np.linspace(-20.0, 30.0, 101)
-    table = pd.DataFrame({"after_border_m": place_m, "theta_true": np.where(place_m < 0.0, 0.9, 0.2)})
+    position_m = np.linspace(-20.0, 30.0, 101)
+    table = pd.DataFrame({"after_border_m": position_m, "theta_true": np.where(position_m < 0.0, 0.9, 0.2)})
     for run in ("with_camera", "without_camera"):
         table[f"TRPAC_{run}"], table[f"TRPAC_low_{run}"], table[f"TRPAC_high_{run}"] = 0.5, 0.1, 1.0
     path = tmp_path / "figure.png"
