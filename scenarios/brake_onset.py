@@ -146,7 +146,7 @@ class Onset:
 
 
 def _interval(plan: Plan) -> str:
-    return f"{plan.TRPAC:.2f} ({plan.TRPAC_low:.2f} to {plan.TRPAC_high:.2f})"
+    return f"{plan.TRPAC:.2f} (95 % interval {plan.TRPAC_low:.2f} to {plan.TRPAC_high:.2f})"
 
 
 @dataclass(frozen=True)
