@@ -175,8 +175,8 @@ ONSET = Onset(
 def test_the_sentence_holds_both_runs_the_truth_and_the_plans():
     assert ONSET.sentence == (
         "At brake onset on snow or ice (true peak friction 0.20) TRPAC is 0.30 (95 % interval 0.02 to 1.10) with the "
-        "camera and 0.70 (95 % interval 0.00 to 1.20) without it. At 15.0 m/s a controller plans a stop in 38 m with the camera and 16 m "
-        "without it; the road allows 57 m at best. The simulated car stops in 60 m."
+        "camera and 0.70 (95 % interval 0.00 to 1.20) without it. At 15.0 m/s a controller plans a stop in 38 m with "
+        "the camera and 16 m without it; the road allows 57 m at best. The simulated car stops in 60 m."
     )
 
 
