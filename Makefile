@@ -20,9 +20,10 @@ $(READY): requirements/dev.txt pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
 	@touch $@
 
-demo: $(READY)   ## build the unit, drive it over the paper's road, write out/demo
+demo: $(READY)   ## build the unit, drive it over the paper's road and onto snow and wet, write out/demo
 	$(BIN)/python build_fmu.py --out dist
-	$(BIN)/trpac run scenarios/paper_simulation.yaml --fmu dist/TrpacEstimator.fmu --out out/demo
+	$(BIN)/trpac run scenarios/paper_simulation.yaml --fmu dist/TrpacEstimator.fmu --out out/demo \
+	  --compare-camera scenarios/cruise_onto_snow.yaml --compare-camera scenarios/cruise_onto_wet.yaml
 
 COMPILING := tests/sim2real/test_gap_observer.py::test_a_log_without_measurements_is_the_plain_simulation_from_rest \
   tests/benchmarks/test_withheld_plant.py::test_neutral_effect_is_the_nominal_car \
