@@ -4,126 +4,175 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 
+from scenarios.known import interval
 from scenarios.metrics import estimators
+from scenarios.plot_style import (
+    BAND,
+    BLUE,
+    DASH_DOT,
+    DASHED,
+    GREEN,
+    PLAIN,
+    PURPLE,
+    SHADE,
+    SNOW,
+    TRUTH,
+    VERMILLION,
+    WET,
+    Style,
+    estimator_styles,
+)
+from scenarios.plots import Figure, Panel, Series, Shade, png
 from scenarios.runner import Run
 from trpac_core.estimator_data import Method
 from trpac_core.vehicle import WHEELS
 
-IMAGE, DYNAMICS, FUSED = "#d08a00", "#7fb2e5", "#c0272d"
-LINES = {"TRPAC_image": (IMAGE, 1.1), "TRPAC_dynamics": (DYNAMICS, 3.0), "TRPAC": (FUSED, 1.3)}
-"""Colour and width of a line; DE is a band under DIFE, so that both are visible where they agree."""
-TRUTH = "#222222"
-ROAD = {"dry": "#eeeeea", "wet": "#d3e0ec", "snow_ice": "#f2f6fb"}
+ROAD = {"dry": SHADE, "wet": WET, "snow_ice": SNOW}
+"""Ground of each surface."""
+TORQUE = Style(VERMILLION, DASH_DOT, width=1.0)
+SHORTEST_NAMED = 1.0 / 12.0
+"""Share of the time below which a stretch is not named: there is no room [-]."""
+NOT_DRIVEN = "the run ended before its first step."
 
 
 def draw_figure17(run: Run, path: Path) -> None:
-    """Write the figure: speed, slip, start/stop flag, visual flag, gain, estimates, errors."""
+    """Write the figure as PNG: speed, slip, start/stop flag, visual flag, gain, estimates, errors."""
+    noise = run.scenario.sensors
+    title = (
+        f"{run.scenario.name}, wheel {run.scenario.wheel}, seed {run.scenario.seed}, "
+        f"C_x {run.scenario.vehicle.tyre.longitudinal_stiffness_n / 1e3:g} kN; noise: "
+        f"{noise.vehicle_speed_noise_m_s:g} m/s, {noise.wheel_speed_noise_rad_s:g} rad/s, "
+        f"{noise.wheel_torque_noise_nm:g} N m"
+    )
+    path.write_bytes(png(figure17(run), title, row_in=1.45))
+
+
+def figure17(run: Run) -> Figure:
+    """The seven panels."""
     table, method = run.table, Method.of(run.summary["method"])
     time = table["time_s"].to_numpy()
-    with plt.rc_context({"font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.axisbelow": True}):
-        figure, axes = plt.subplots(
-            7, 1, figsize=(9.5, 14.0), sharex=True, height_ratios=[1.2, 1.5, 0.6, 0.6, 1.0, 2.6, 1.8]
-        )
-        for axis in axes:
-            _shade_road(axis, run, time)
-        _motion(axes[0], axes[1], run, table, time)
-        _flags(axes[2], axes[3], axes[4], table, time)
-        _estimates(axes[5], table, time, method)
-        _errors(axes[6], table, time, method)
-        axes[6].set_xlabel("time [s]")
-        axes[0].set_xlim(time[0], time[-1])
-        noise = run.scenario.sensors
-        axes[0].set_title(
-            f"{run.scenario.name}, wheel {run.scenario.wheel}, seed {run.scenario.seed}, "
-            f"C_x {run.scenario.vehicle.tyre.longitudinal_stiffness_n / 1e3:g} kN; noise: "
-            f"{noise.vehicle_speed_noise_m_s:g} m/s, {noise.wheel_speed_noise_rad_s:g} rad/s, "
-            f"{noise.wheel_torque_noise_nm:g} N m",
-            fontsize=9,
-            parse_math=False,  # the name is the file's, and a $ in it is a $
-        )
-        figure.align_ylabels(axes)
-        figure.tight_layout(h_pad=0.4)
-        figure.savefig(path, dpi=130)
-        plt.close(figure)
+    panels = (*_motion(run, table, time), *_flags(table, time), *_estimates(table, time, method))
+    return Figure(
+        "Speed, slip, start/stop flag, visual flag, gain, estimates and errors over time",
+        tuple(_on_the_road(panel, run, time, first=i == 0) for i, panel in enumerate(panels)),
+    )
 
 
-def _shade_road(axis: Axes, run: Run, time: np.ndarray) -> None:
-    """Colour the background by the surface under the wheel."""
-    segment = run.table["segment"].to_numpy()
-    for index in np.unique(segment):
-        here = time[segment == index]
-        surface = run.scenario.road.segments[index].surface
-        axis.axvspan(here[0], here[-1], color=ROAD[surface], lw=0, zorder=-10)
+def _on_the_road(panel: Panel, run: Run, time: np.ndarray, *, first: bool) -> Panel:
+    """The panel over the surfaces under the wheel; the first names surface and adhesion of each stretch."""
+    shades = []
+    for index, rows in run.table.groupby("segment"):
+        here, surface = time[rows.index.to_numpy()], run.scenario.road.segments[int(str(index))].surface
+        named = first and here[-1] - here[0] >= SHORTEST_NAMED * (time[-1] - time[0])
+        text = f"{surface.replace('_', ' or ')}\n{rows['theta_true'].iloc[0]:g}" if named else ""
+        shades.append(Shade(float(here[0]), float(here[-1]), ROAD[surface], text))
+    ends = (float(time[0]), float(time[-1]))
+    return Panel(**{**vars(panel), "shades": tuple(shades), "x_limits": ends})
 
 
-def _motion(speed: Axes, slip: Axes, run: Run, table: pd.DataFrame, time: np.ndarray) -> None:
-    speed.plot(time, run.trajectory.speed_m_s, color=TRUTH, lw=1.4)
-    speed.set_ylabel("(a) speed\n[m/s]")
-    torque = speed.twinx()
+def _motion(run: Run, table: pd.DataFrame, time: np.ndarray) -> tuple[Panel, Panel]:
     wheel = WHEELS.index(run.scenario.wheel)
-    torque.plot(time, run.trajectory.wheel_torque_nm[:, wheel], color="#999999", lw=0.8)
-    torque.set_ylabel("torque [N m]", color="#777777")
-    torque.grid(visible=False)
-    slip.plot(time, run.trajectory.slip[:, wheel], color="#999999", lw=1.2, label="true")
-    slip.plot(time, table["slip"], color=TRUTH, lw=0.8, label="in the unit")
-    slip.plot(time, table["excitation_threshold"], color="#2c9c5a", lw=1.0, ls="--", label="threshold")
-    slip.set_ylim(0.0, max(0.03, 1.2 * float(table["slip"].max())))
-    slip.set_ylabel("(b) slip [-]")
-    slip.legend(loc="upper left", ncols=3, fontsize=8)
+    speed = Panel(
+        "(a) speed [m/s]",
+        NOT_DRIVEN,
+        (
+            Series("speed", time, run.trajectory.speed_m_s, PLAIN),
+            Series("wheel torque", time, run.trajectory.wheel_torque_nm[:, wheel], TORQUE, right=True),
+        ),
+        right_label="torque [N m]",
+        y_limits=(0.0, 1.5 * max(float(run.trajectory.speed_m_s.max()), 1.0)),
+        height=1.1,
+    )
+    slip = Panel(
+        "(b) slip [-]",
+        NOT_DRIVEN,
+        (
+            Series("true", time, run.trajectory.slip[:, wheel], TRUTH),
+            Series("in the unit", time, table["slip"].to_numpy(), Style(BLUE, width=1.2)),
+            Series("threshold", time, table["excitation_threshold"].to_numpy(), Style(PURPLE, DASHED)),
+        ),
+        y_limits=(0.0, max(0.03, 1.2 * float(table["slip"].max()))),
+        height=1.3,
+    )
+    return speed, slip
 
 
-def _flags(start_stop: Axes, visual: Axes, gain: Axes, table: pd.DataFrame, time: np.ndarray) -> None:
-    start_stop.fill_between(time, table["excitation_flag"].astype(float), step="post", color="#2c9c5a", lw=0)
-    start_stop.set_ylabel("(c) start/\nstop")
-    visual.fill_between(time, table["flag"].astype(float), step="post", color=IMAGE, lw=0)
-    visual.plot(time, table["image_confidence"], color=TRUTH, lw=0.7)
-    visual.set_ylabel("(d) visual\nflag, Q_v")
-    for axis in (start_stop, visual):
-        axis.set_ylim(-0.05, 1.1)
-        axis.set_yticks([0, 1])
-    gain.plot(time, table["K_v"], color=FUSED, lw=1.2)
-    gain.set_ylim(bottom=-0.05)
-    gain.set_ylabel("(e) gain\n$K_v$")
+def _flags(table: pd.DataFrame, time: np.ndarray) -> tuple[Panel, Panel, Panel]:
+    none, excited, flag = np.zeros(len(time)), table["excitation_flag"], table["flag"]
+    q_v = table["image_confidence"].to_numpy()
+    on_off = {0.0: "0", 1.0: "1"}
+    start_stop = Panel(
+        "(c) start/stop flag",
+        "the slip stayed below the threshold: the estimator never ran.",
+        (
+            Series(
+                "",
+                time,
+                np.where(excited.any(), excited.to_numpy(float), np.nan),
+                Style(GREEN),
+                "step",
+                low=none,
+            ),
+        ),
+        y_limits=(-0.05, 1.1),
+        ticks=on_off,
+        height=0.5,
+    )
+    seen = bool(flag.any() or q_v.any())
+    visual = Panel(
+        "(d) visual flag, Q_v",
+        "no picture gave a class of the road under the wheel.",
+        (
+            Series(
+                "visual flag", time, np.where(seen, flag.to_numpy(float), np.nan), Style(PURPLE), "step", none
+            ),
+            Series("Q_v", time, np.where(seen, q_v, np.nan), PLAIN),
+        ),
+        y_limits=(-0.05, 1.1),
+        ticks=on_off,
+        height=0.6,
+    )
+    gain = Panel(
+        "(e) visual gain K_v",
+        "the camera's class is not used, so there is no gain.",
+        (Series("", time, np.where(table["K_v"].any(), table["K_v"], np.nan), PLAIN),),
+        height=0.8,
+    )
+    return start_stop, visual, gain
 
 
-def _estimates(axis: Axes, table: pd.DataFrame, time: np.ndarray, method: Method) -> None:
-    axis.plot(time, table["theta_true"], color=TRUTH, lw=2.2, label="true TRPAC")
-    for name, column in estimators(method).items():
-        colour, width = LINES[column]
-        axis.plot(time, table[column], color=colour, lw=width, label=name)
-    if method is Method.ROBUST:
-        low, high, band = table["TRPAC_low"], table["TRPAC_high"], "95 % interval"
-    else:
-        two_std = 2.0 * table["TRPAC_std"]
-        low, high = table["TRPAC"] - two_std, table["TRPAC"] + two_std
-        band = f"{method.title} ± 2 TRPAC_std"
-    axis.fill_between(time, low, high, color=FUSED, alpha=0.10, lw=0, label=band)
-    axis.set_ylim(0.0, 1.1)
-    axis.set_ylabel("(f) TRPAC [-]")
-    axis.legend(loc="lower left", ncols=5, fontsize=8)
-    for start, end, text in _stretches(table, time):
-        axis.text(0.5 * (start + end), 1.03, text, ha="center", va="bottom", fontsize=8)
-
-
-def _stretches(table: pd.DataFrame, time: np.ndarray) -> list[tuple[float, float, str]]:
-    """Begin, end and true adhesion of each stretch of road."""
-    stretches = []
-    for _, rows in table.groupby("segment"):
-        here = time[rows.index.to_numpy()]
-        stretches.append((float(here[0]), float(here[-1]), f"{rows['theta_true'].iloc[0]:g}"))
-    return stretches
-
-
-def _errors(axis: Axes, table: pd.DataFrame, time: np.ndarray, method: Method) -> None:
-    for name, column in estimators(method).items():
-        colour, width = LINES[column]
-        axis.plot(time, table[column] - table["theta_true"], color=colour, lw=width, label=name)
-    axis.axhspan(-0.02, 0.02, color=TRUTH, alpha=0.12, lw=0, label="± 0.02")
-    axis.set_ylim(-0.45, 0.6)
-    axis.set_ylabel("(g) error [-]")
-    axis.legend(loc="upper left", ncols=4, fontsize=8)
+def _estimates(table: pd.DataFrame, time: np.ndarray, method: Method) -> tuple[Panel, Panel]:
+    columns = estimators(method)
+    styles, truth = estimator_styles(list(columns)), table["theta_true"].to_numpy()
+    said = (table[name].to_numpy() for name in ("TRPAC", "TRPAC_std", "TRPAC_low", "TRPAC_high"))
+    low, high = interval(method, *said)
+    band = "95 % interval" if method is Method.ROBUST else f"{method.title} ± 2 TRPAC_std"
+    edges = np.array([time[0], time[-1]])
+    estimates = Panel(
+        "(f) TRPAC [-]",
+        NOT_DRIVEN,
+        (
+            Series(band, time, high, Style(BAND), low=low),
+            Series("true TRPAC", time, truth, TRUTH, "step"),
+            *(Series(name, time, table[column].to_numpy(), styles[name]) for name, column in columns.items()),
+        ),
+        y_limits=(0.0, 1.1),
+        height=2.2,
+    )
+    errors = Panel(
+        "(g) error [-]",
+        NOT_DRIVEN,
+        (
+            Series("± 0.02", edges, np.full(2, 0.02), Style(SHADE), low=np.full(2, -0.02)),
+            *(
+                Series(name, time, table[column].to_numpy() - truth, styles[name])
+                for name, column in columns.items()
+            ),
+        ),
+        y_limits=(-0.45, 0.6),
+        height=1.6,
+    )
+    return estimates, errors

@@ -20,8 +20,9 @@ from scenarios.pictures import record
 from scenarios.plant.pipeline import PlantTrajectory, drive
 from scenarios.plant.sensors import make_scenario_log
 from scenarios.progress import StageProgress, silent
-from trpac_core.estimator_data import Method
+from trpac_core.estimator_data import Method, Source
 from trpac_core.files import file_sha256
+from trpac_core.robust.belief import MOST_SLIP
 from trpac_core.vehicle import WHEELS
 
 PACKAGES = (
@@ -163,6 +164,19 @@ def summarise(scenario: Scenario, table: pd.DataFrame, fmu: Path, method: Method
         "fmu_sha256": file_sha256(fmu),
         "versions": {package: version(package) for package in PACKAGES},
         "estimators": scores,
+        "at_the_end": [_at_the_end(rows, scenario.step_s) for _, rows in table.groupby("segment")],
+    }
+
+
+def _at_the_end(rows: pd.DataFrame, step_s: float) -> dict[str, Any]:
+    """TRPAC at the end of a stretch, what it rests on, and how long the tyre showed the road there [s]."""
+    last, tyre = rows.iloc[-1], rows["TRPAC_source"].to_numpy(int) & Source.TYRE > 0
+    shown = tyre & rows["excitation_flag"].to_numpy(bool)
+    return {
+        **{name: float(last[name]) for name in ("TRPAC", "TRPAC_std", "TRPAC_low", "TRPAC_high")},
+        "shown_s": float(np.count_nonzero(shown)) * step_s,
+        "camera": bool(int(last["TRPAC_source"]) & Source.CAMERA),
+        "spun": bool((rows["slip"] > MOST_SLIP).any()),
     }
 
 

@@ -9,14 +9,15 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-ESTIMATE, CAMERA, TRUTH, EXCITED = "#c0272d", "#d08a00", "#222222", "#dfe8d8"
+from scenarios.plot_style import BLUE, ESTIMATOR_STYLES, LINE, MATPLOTLIB, PLAIN, TRUTH
+
 PANELS = (("fl", "front left"), ("fr", "front right"), ("rl", "rear left"), ("rr", "rear right"))
 
 
 def draw_split(table: pd.DataFrame, path: Path) -> None:
     """Write the figure: a panel per wheel, then the car, then the speed."""
     time = table["time_s"].to_numpy()
-    with plt.rc_context({"font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.axisbelow": True}):
+    with plt.rc_context(MATPLOTLIB):
         figure, axes = plt.subplot_mosaic(
             [["fl", "fr"], ["rl", "rr"], ["vehicle", "vehicle"], ["speed", "speed"]],
             figsize=(10.0, 9.5),
@@ -30,7 +31,7 @@ def draw_split(table: pd.DataFrame, path: Path) -> None:
         axes["vehicle"].set_title("car: what braking can use")
         handles, labels = axes["fl"].get_legend_handles_labels()
         figure.legend(handles, labels, loc="upper center", ncols=len(labels), frameon=False)
-        axes["speed"].plot(time, table["speed_m_s"], color=TRUTH, linewidth=1.2)
+        axes["speed"].plot(time, table["speed_m_s"], **PLAIN.matplotlib)
         axes["speed"].set_ylabel("speed [m/s]")
         axes["speed"].set_xlabel("time [s]")
         axes["speed"].set_xlim(time[0], time[-1])
@@ -45,20 +46,20 @@ def _estimates(axis: Axes, table: pd.DataFrame, time: np.ndarray, suffix: str) -
     if f"excitation_flag.{suffix}" in table:
         excited = table[f"excitation_flag.{suffix}"].to_numpy() > 0.5
         axis.fill_between(
-            time, 0.0, 1.2, where=excited, color=EXCITED, linewidth=0.0, label="tyre excited", step="mid"
+            time, 0.0, 1.2, where=excited, color=LINE.light, linewidth=0.0, label="tyre excited", step="mid"
         )
         seen = np.where(table[f"flag.{suffix}"] > 0.5, table[f"TRPAC_image.{suffix}"], np.nan)
-        axis.plot(time, seen, color=CAMERA, linewidth=1.0, label="camera's class")
+        axis.plot(time, seen, **ESTIMATOR_STYLES["IFE"].matplotlib, label="camera's class")
     axis.fill_between(
         time,
         theta - 2.0 * deviation,
         theta + 2.0 * deviation,
-        color=ESTIMATE,
+        color=BLUE.light,
         alpha=0.15,
         linewidth=0.0,
-        label="+-2 TRPAC_std",
+        label="±2 TRPAC_std",
     )
-    axis.plot(time, table[f"theta.{suffix}"], color=TRUTH, linewidth=1.2, linestyle="--", label="true")
-    axis.plot(time, theta, color=ESTIMATE, linewidth=1.4, label="TRPAC")
+    axis.plot(time, table[f"theta.{suffix}"], **TRUTH.matplotlib, label="true")
+    axis.plot(time, theta, **ESTIMATOR_STYLES["robust"].matplotlib, label="TRPAC")
     axis.set_ylim(0.0, 1.2)
     axis.set_ylabel("theta [-]")

@@ -63,9 +63,10 @@ class Estimates:
 
     def plot(self) -> Picture:
         """A figure of the car's estimate with its deviation or interval, the flags and the drive."""
+        from scenarios.plots import png
         from sim2real.replay.figures import estimate
 
-        return Picture(estimate(self._replay))
+        return Picture(png(estimate(self._replay)))
 
     def to_html(self, path: str | Path) -> Path:
         """Write the report; returns its path."""

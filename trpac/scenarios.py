@@ -142,13 +142,13 @@ class ScenarioRun:
                 draw_overlay_sheet(
                     self._run, overlay, lambda done, total: progress("drawing the report", done, total)
                 )
-            figure = self.figure17().save(made / "figure17.png")
+            self.figure17().save(made / "figure17.png")
             onset_figure = None
             if self._comparisons:
                 onset_figure = made / "brake_onset.png"
                 draw_brake_onset(self._comparisons, onset_figure)
             report = made / "report.html"
-            write_report(self._run, figure, overlay, report, self._comparisons, onset_figure)
+            write_report(self._run, overlay, report, self._comparisons, onset_figure)
             write_run(self._run, made)
             names = sorted(path.name for path in made.iterdir())
         return tuple(Path(folder) / name for name in names)

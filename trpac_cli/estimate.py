@@ -101,7 +101,7 @@ def estimate(
 
 
 def _error_table(errors: dict[str, Any]) -> Table:
-    from sim2real.replay.report import number, percent
+    from scenarios.html_page import number, percent
 
     table = Table(
         title="TRPAC_peak against mu_reference", title_justify="left", box=SIMPLE_HEAD, pad_edge=False
@@ -117,7 +117,7 @@ def _error_table(errors: dict[str, Any]) -> Table:
                 name,
                 label,
                 number(score["time_s"], 1),
-                number(score["mean_abs"]),
-                percent(score["within_2_std"]),
+                number(score["mean_abs"], 3, "no such row"),
+                percent(score["within_2_std"], "no deviation"),
             )
     return table

@@ -365,7 +365,7 @@ def _print_truth(console: Terminal, case: Case, truth: Truth, diagnosis: Diagnos
 
 def judge(hidden: str, diagnosis: Diagnosis) -> str:
     """The sentence, with markup, on whether the diagnosis found the hidden effect."""
-    from sim2real.reporting.report import percent
+    from scenarios.html_page import percent
 
     ranked = [c.effect for c in diagnosis.causes]
     if hidden not in ranked:
@@ -384,7 +384,8 @@ def judge(hidden: str, diagnosis: Diagnosis) -> str:
 
 def _summarise(console: Terminal, diagnosis: Diagnosis) -> None:
     """Print outcome, gap and first causes."""
-    from sim2real.reporting.report import budget_parts, leading, percent
+    from scenarios.html_page import percent
+    from sim2real.reporting.report import budget_parts, leading
     from sim2real.result import added
 
     gap = diagnosis.gap
@@ -424,7 +425,8 @@ def _how_to_apply(diagnosis: Diagnosis, vehicle: Path, written: Path) -> str:
 
 
 def _cause_table(diagnosis: Diagnosis) -> Table:
-    from sim2real.reporting.report import estimate, number, percent
+    from scenarios.html_page import number, percent
+    from sim2real.reporting.report import estimate
 
     table = Table(title="Causes, most probable first", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     table.add_column("effect", no_wrap=True)
@@ -438,7 +440,7 @@ def _cause_table(diagnosis: Diagnosis) -> Table:
             cause.effect,
             percent(cause.probability),
             values,
-            number(cause.gap_after),
+            number(cause.gap_after, 2),
             percent(0.01 * cause.shrink_percent.value),
         )
     return table

@@ -105,6 +105,7 @@ def run(
     except (TrpacError, OSError) as error:
         refuse("trpac run", error)
     console = Terminal()
+    console.print(finished.verdict)
     console.print(_score_table(finished.summary))
     for sentence in finished.brake_onsets:
         console.print(sentence)
@@ -138,7 +139,8 @@ def example(
 
 def _score_table(summary: dict) -> Table:
     """The table of scores for the terminal."""
-    from scenarios.report import number, score_rows, title
+    from scenarios.html_page import number
+    from scenarios.report import score_rows, title
 
     table = Table(title=f"{summary['scenario']}, seed {summary['seed']}")
     headings = (
@@ -155,9 +157,9 @@ def _score_table(summary: dict) -> Table:
         table.add_row(
             name,
             f"{score['theta']:g}",
-            number(score["steady_state_error"]),
-            number(score["convergence_time_s"], 2),
-            number(score["wall_convergence_time_s"], 2),
+            number(score["steady_state_error"], 3, "not excited"),
+            number(score["convergence_time_s"], 2, "not reached"),
+            number(score["wall_convergence_time_s"], 2, "not reached"),
             number(score["excited_time_s"], 2),
             style="bold" if name == title(summary) else None,
         )

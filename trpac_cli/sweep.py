@@ -31,6 +31,9 @@ def sweep(
         Path, typer.Argument(help="Sweep file, or the name of a shipped one, such as paper_simulation.")
     ],
     out: Annotated[Path, typer.Option(help="Folder for runs.parquet, report.html and summary.json.")],
+    runs: Annotated[
+        int | None, typer.Option(min=1, help="Runs of each level, in place of the number in the file.")
+    ] = None,
     scheduler: Annotated[
         str | None,
         typer.Option(help="Address of a running Dask cluster; without it the runs use this machine."),
@@ -63,7 +66,7 @@ def sweep(
     try:
         _require(scheduler, jobs)
         require_folder("trpac sweep", out)
-        loaded = load_sweep(file, allow_code=allow_code)
+        loaded = load_sweep(file, allow_code=allow_code, runs=runs)
         with bars() as progress:
             parts, failures = execute(loaded, out, scheduler, jobs, partial(progress, "runs"))
         if not parts.empty():
@@ -84,6 +87,7 @@ def _require(scheduler: str | None, jobs: int | None) -> None:
 
 def _finish(loaded: Sweep, parts: Parts, failures: list[Failure], out: Path, console: Terminal) -> None:
     """Write table, summary and report, all or none, and print the summary."""
+    from scenarios.sweep.outcome import outcome
     from scenarios.sweep.report import write_report
     from scenarios.sweep.store import write_table
     from scenarios.sweep.summary import summarise
@@ -97,17 +101,19 @@ def _finish(loaded: Sweep, parts: Parts, failures: list[Failure], out: Path, con
         "cpu_s": {"total": sum(cpu_s), "median_per_run": sorted(cpu_s)[len(cpu_s) // 2]},
         **summarise(table),
     }
+    became = outcome(table, failures)
     with written_whole(out) as made:
         write_table(table, made / "runs.parquet")
         (made / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        write_report(loaded, table, summary, failures, made / "report.html")
-    console.print(_shown(summary))
+        write_report(loaded, table, summary, became, made / "report.html")
+    console.print(became.sentence)
+    console.print(_shown(summary, became.estimator))
     console.print(f"Report: {out / 'report.html'}   table: {out / 'runs.parquet'}", soft_wrap=True)
 
 
-def _shown(summary: dict[str, Any]) -> Table:
+def _shown(summary: dict[str, Any], main: str) -> Table:
     """The table of medians and 95th percentiles for the terminal."""
-    from scenarios.report import number
+    from scenarios.html_page import number
 
     table = Table(
         title=f"{summary['name']}: slippery stretches that the tyre showed, median / 95th percentile"
@@ -128,7 +134,7 @@ def _shown(summary: dict[str, Any]) -> Table:
             shown, covered = found["shown"], found["coverage"]
             times = [
                 " / ".join(
-                    "never" if shown[m][q] is None else f"{shown[m][q]:.2f}"
+                    number(shown[m][q], 2, "not reached" if shown["stretches"] else "not shown")
                     for q in ("median", "percentile_95")
                 )
                 for m in ("convergence_time_s", "band_time_s")
@@ -137,9 +143,9 @@ def _shown(summary: dict[str, Any]) -> Table:
             table.add_row(
                 where,
                 name,
-                f"{number(error['median'], 4)} / {number(error['percentile_95'], 4)}",
+                " / ".join(number(error[q], 4, "not excited") for q in ("median", "percentile_95")),
                 *times,
-                number(covered["all_time"], 3) if covered else number(None),
-                style="bold" if name == "DIFE" else None,
+                number(covered["all_time"], 3) if covered else "no std",
+                style="bold" if name == main else None,
             )
     return table

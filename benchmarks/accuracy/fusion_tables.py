@@ -18,6 +18,7 @@ from benchmarks.accuracy import oracle
 from benchmarks.accuracy.full_run import full_run
 from benchmarks.report import markdown, write_between
 from scenarios.figure17 import draw_figure17
+from scenarios.plots import png
 from scenarios.sweep import figures
 from scenarios.sweep.draw import plan_run, run_keys
 from scenarios.sweep.files import load_sweep
@@ -280,11 +281,9 @@ def draw(found: dict[str, dict[str, Any]]) -> None:
         draw_figure17(full_run(plan_run(sweep, run_keys(sweep)[0])), PICTURES / f"{name}.png")
     if "paper_simulation" in found:
         table = found["paper_simulation"]["table"]
-        (PICTURES / "distributions.png").write_bytes(figures.distributions(table))
-        (PICTURES / "errors.png").write_bytes(figures.errors_by_friction(table))
-        covered = figures.coverage_figure(table)
-        if covered is not None:
-            (PICTURES / "coverage.png").write_bytes(covered)
+        (PICTURES / "distributions.png").write_bytes(png(figures.distributions(table)))
+        (PICTURES / "errors.png").write_bytes(png(figures.errors_by_friction(table)))
+        (PICTURES / "coverage.png").write_bytes(png(figures.coverage(table)))
 
 
 if __name__ == "__main__":

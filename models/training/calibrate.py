@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from scenarios.camera.disturbances import PAPER, disturb
+from scenarios.plot_style import BLUE, VERMILLION
 from trpac_core.vision.networks import calibrated_probabilities
 
 from .data import Image
@@ -95,14 +96,14 @@ def draw_reliability(before: Reliability, after: Reliability, temperature: float
             centres[filled],
             curve.accuracy[filled],
             width,
-            color="#3b6fb6",
+            color=BLUE.light,
             edgecolor="black",
             label="accuracy",
         )
         gap = curve.confidence[filled] - curve.accuracy[filled]
         axis.bar(
-            centres[filled], gap, width, bottom=curve.accuracy[filled], color="#d1495b", alpha=0.35,
-            edgecolor="#d1495b", hatch="//", label="gap to confidence",
+            centres[filled], gap, width, bottom=curve.accuracy[filled], color=VERMILLION.light, alpha=0.35,
+            edgecolor=VERMILLION.light, hatch="//", label="gap to confidence",
         )  # fmt: skip
         axis.plot([0, 1], [0, 1], "--", color="grey", label="perfect calibration")
         errors = f"ECE {curve.ece:.3f}\nMCE {curve.mce:.3f}"

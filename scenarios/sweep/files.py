@@ -182,6 +182,11 @@ class SweepFile(_Section):
     """Parameters of the estimator by the unit's names, in place of the default ones."""
     vary: Annotated[list[Axis], Field(max_length=MOST_NAMED)] = Field(default_factory=list)
 
+    @property
+    def levels(self) -> int:
+        """Number of levels of all varied quantities; 1 where none is varied."""
+        return sum(len(axis.levels) for axis in self.vary) or 1
+
     @model_validator(mode="after")
     def _check(self) -> SweepFile:
         known = list(drawn_numbers(self))
@@ -195,7 +200,7 @@ class SweepFile(_Section):
         twice = sorted({name for name in self.estimators if self.estimators.count(name) > 1})
         problems += [f"estimators names {name} twice." for name in twice]
         problems += [text for name, value in _all_numbers(self) if (text := _out_of_range(name, value))]
-        runs = self.runs * (sum(len(axis.levels) for axis in self.vary) or 1)
+        runs = self.runs * self.levels
         if runs > MOST_RUNS:
             problems.append(f"runs times levels are {runs}; expected at most {MOST_RUNS}.")
         if problems:
@@ -290,7 +295,16 @@ class Sweep:
     scenario: Scenario
 
 
-def load_sweep(path: str | Path, *, allow_code: bool = False) -> Sweep:
+def _with_runs(file: SweepFile, runs: int) -> SweepFile:
+    """The file with another number of runs; raises ScenarioError where these are too few or too many."""
+    if not 1 <= runs <= MOST_RUNS // file.levels:
+        raise ScenarioError(
+            f"--runs is {runs}; expected 1 to {MOST_RUNS // file.levels} for {file.levels} levels of the sweep."
+        )
+    return file.model_copy(update={"runs": runs})
+
+
+def load_sweep(path: str | Path, *, allow_code: bool = False, runs: int | None = None) -> Sweep:
     """A sweep file with its scenario; raises ScenarioError with all problems.
 
     Parameters
@@ -299,9 +313,13 @@ def load_sweep(path: str | Path, *, allow_code: bool = False) -> Sweep:
         The file.
     allow_code : bool
         Whether estimators may be package.module:function, which is imported and run.
+    runs : int, optional
+        Number of runs of each level, in place of the file's.
     """
     path = located("sweep", path)
     file = load_strict(path, SweepFile)
+    if runs is not None:
+        file = _with_runs(file, runs)
     addresses = [name for name in file.estimators if ADDRESS.fullmatch(name)]
     if addresses and not allow_code:
         raise ScenarioError(

@@ -7,51 +7,51 @@ from typing import Any
 
 import pandas as pd
 
-from scenarios.html_page import data_address, page
-from scenarios.report import number
+from scenarios.html_page import page
+from scenarios.plots import Figure
 from scenarios.sweep import figures
-from scenarios.sweep.execute import Failure
 from scenarios.sweep.files import Sweep
+from scenarios.sweep.outcome import Outcome
+from scenarios.sweep.store import source_digest
 from scenarios.sweep.summary import ENOUGH_SHOWN_S
 
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
+MOST_LISTED = 500
+"""Runs that the report lists; further ones are in runs.parquet."""
 
 
 def write_report(
-    sweep: Sweep, table: pd.DataFrame, summary: dict[str, Any], failures: list[Failure], path: Path
+    sweep: Sweep, table: pd.DataFrame, summary: dict[str, Any], outcome: Outcome, path: Path
 ) -> None:
     """Write the report of a finished sweep."""
-    file = sweep.file
     text = page(
         TEMPLATE,
-        {"number": number, "never": lambda value: "never" if value is None else f"{value:.2f}"},
-        name=file.name,
-        description=file.description,
-        runs=table["run"].nunique(),
+        file=sweep.file,
         scenario=sweep.scenario.name,
-        camera=file.camera.source,
-        seed=file.seed,
+        path=sweep.path.name,
+        outcome=outcome,
         levels=summary["levels"],
-        failures=[f"run {f.run} ({f.why})" for f in failures],
         enough_s=ENOUGH_SHOWN_S,
-        pictures=[(title, caption, data_address(data)) for title, caption, data in _pictures(table)],
+        most=MOST_LISTED,
+        source=source_digest(),
+        figures=_figures(table),
     )
     path.write_bytes(text.encode("utf-8", "backslashreplace"))  # a name may hold half a surrogate pair
 
 
-def _pictures(table: pd.DataFrame) -> list[tuple[str, str, bytes]]:
-    """Title, caption and PNG of each figure."""
+def _figures(table: pd.DataFrame) -> list[tuple[str, str, Figure]]:
+    """Title, caption and plots of each part."""
     shown = []
     if table["parameter"].nunique() == 1 and table["level"].nunique() <= 1:
-        caption = "Share of stretches that are at most so far off, or take at most so long. Crosses: what is asked for."
+        caption = "Share of stretches with at most this error or time. Crosses: required median and 95th percentile."
         shown.append(("Error and convergence", caption, figures.distributions(table)))
-        caption = "Every stretch of every run. Grey: the tyre did not truly show its friction for long enough there."
+        caption = "Every stretch of every run, by whether the tyre showed its friction for long enough there."
         shown.append(("Error over true friction", caption, figures.errors_by_friction(table)))
-    covered = figures.coverage_figure(table)
-    if covered is not None:
-        caption = "Share of time with the true value within 2 TRPAC_std."
-        shown.append(("Coverage of TRPAC_std", caption, covered))
-    for parameter, picture in figures.degradations(table):
-        caption = "Slippery stretches that the tyre showed; on the right all the time on slippery stretches."
-        shown.append((f"Degradation over {parameter}", caption, picture))
+    caption = "Share of time with the true value within 2 TRPAC_std."
+    shown.append(("Coverage of TRPAC_std", caption, figures.coverage(table)))
+    for parameter, figure in figures.degradations(table):
+        caption = (
+            "Slippery stretches on which the tyre showed its friction; the last plot: all slippery stretches."
+        )
+        shown.append((f"Degradation over {parameter}", caption, figure))
     return shown

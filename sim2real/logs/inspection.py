@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scenarios.plot_style import LOST, WHEEL_STYLES
+from scenarios.plots import Figure, Panel, Series, Shade, png, thin
 from scenarios.whole_files import write_whole
 from sim2real.logs.contract import COLUMNS, POSITION, REQUIRED, TIME, WHEEL_SPEEDS
 from sim2real.logs.mapping import Spec
@@ -18,16 +18,8 @@ from sim2real.logs.resampling import BROKEN, median_step
 from sim2real.logs.table import Array, read_as
 from trpac_core.vehicle import WHEELS
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-MOST_POINTS = 4_000
-"""Points of a curve in the picture; of longer logs, stretches between show their least and greatest value."""
-COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7")
-"""Okabe and Ito's, which colour-blind people tell apart; the wheels differ by their lines, too."""
-LINES = ("-", "--", "-.", ":")
-LOST_COLOUR, MOST_SHADED = "#d55e00", 50
-"""Shade behind stretches without a sample, and how many of a signal are shaded."""
+MOST_SHADED = 50
+"""Stretches without a sample that are shaded for a signal."""
 
 
 @dataclass(frozen=True)
@@ -92,58 +84,34 @@ def missing_for_diagnosis(log: Understood) -> list[str]:
 
 def draw(log: Understood, path: Path) -> None:
     """Write a picture of the signals as PNG: speeds, torques, accelerations, each over time, lost samples shaded."""
-    from matplotlib.figure import Figure  # takes a second to load
-
-    figure = Figure(figsize=(11.0, 9.0), layout="constrained")
-    panels = figure.subplots(4, 1, sharex=True)
-    _curves(panels[0], log, {"vehicle_speed_m_s": "vehicle"}, "speed [m/s]")
-    _curves(panels[1], log, dict(zip(WHEEL_SPEEDS, WHEELS, strict=True)), "wheel speed [rad/s]")
-    _curves(panels[2], log, {f"wheel_torque_{w}_nm": w for w in WHEELS}, "wheel torque [N m]")
-    _curves(panels[3], log, {"accel_x_m_s2": "a_x", "accel_y_m_s2": "a_y"}, "acceleration [m/s²]")
-    panels[-1].set_xlabel("time [s]")
-    panels[0].set_title(f"{log.path.name}: {read_as(log.table.notes)}", fontsize=10, loc="left")
-    picture = BytesIO()
-    figure.savefig(picture, format="png", dpi=110)
-    write_whole(path, picture.getvalue())
+    panels = (
+        _panel(log, {"vehicle_speed_m_s": "vehicle"}, "speed [m/s]"),
+        _panel(log, dict(zip(WHEEL_SPEEDS, WHEELS, strict=True)), "wheel speed [rad/s]"),
+        _panel(log, {f"wheel_torque_{w}_nm": w for w in WHEELS}, "wheel torque [N m]"),
+        _panel(log, {"accel_x_m_s2": "a_x", "accel_y_m_s2": "a_y"}, "acceleration [m/s²]"),
+    )
+    title = f"{log.path.name}: {read_as(log.table.notes)}"
+    write_whole(path, png(Figure("signals over time", panels), title, row_in=2.1))
 
 
-def _curves(axes: Axes, log: Understood, labels: Mapping[str, str], name: str) -> None:
-    axes.set_ylabel(name)
-    axes.grid(alpha=0.3)
+def _panel(log: Understood, labels: Mapping[str, str], name: str) -> Panel:
     there = [key for key in labels if key in log.signals and np.isfinite(log.signals[key]).any()]
-    for k, key in enumerate(there):
-        at, values = _thinned(log.time_s, log.signals[key])
-        axes.plot(at, values, LINES[k], color=COLOURS[k], lw=1.1, label=labels[key])
-        for start, end in _lost(log.time_s, log.signals[key]):
-            axes.axvspan(start, end, color=LOST_COLOUR, alpha=0.25, lw=0)
-    if there:
-        axes.legend(
-            loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=len(there), fontsize=8, frameon=False
-        )
-    else:
-        axes.text(0.5, 0.5, "not in this log", transform=axes.transAxes, ha="center", color="0.4")
+    series, shades = [], []
+    for key, style in zip(there, WHEEL_STYLES.values(), strict=False):
+        known = np.isfinite(log.signals[key])
+        time_s, values = log.time_s[known], log.signals[key][known]
+        shown = thin(values)
+        series.append(Series(labels[key], time_s[shown], values[shown], style))
+        shades += [Shade(start, end, LOST) for start, end in _lost(time_s)]
+    return Panel(name, "not in this log", tuple(series), shades=tuple(shades))
 
 
-def _lost(time_s: Array, values: Array) -> list[tuple[float, float]]:
-    """The longest stretches without a sample, by a signal's own rate."""
-    t = time_s[np.isfinite(values)]
+def _lost(t: Array) -> list[tuple[float, float]]:
+    """The longest stretches without a sample, by a signal's own rate; its samples' times are given."""
     step = np.diff(t)
     at = np.flatnonzero(step > BROKEN * np.median(step)) if len(step) else np.zeros(0, dtype=np.intp)
     longest = at[np.argsort(-step[at], kind="stable")[:MOST_SHADED]]
     return [(float(t[i]), float(t[i + 1])) for i in longest]
-
-
-def _thinned(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """A curve of at most `MOST_POINTS` points with the least and the greatest value of each stretch."""
-    known = np.isfinite(values)
-    t, x = time_s[known], values[known]
-    every = -(-2 * len(t) // MOST_POINTS)
-    if every < 2:
-        return t, x
-    whole = len(t) // every * every
-    stretches = x[:whole].reshape(-1, every)
-    ends = np.stack((stretches.min(axis=1), stretches.max(axis=1)), axis=1).ravel()
-    return np.repeat(t[:whole:every], 2), ends
 
 
 def _plain(log: Understood, name: str, spec: Spec) -> tuple[str, str, float]:

@@ -6,7 +6,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from scenarios.files import VehicleFile
+from scenarios.known import interval, is_known
 from scenarios.library import PAPER_VEHICLE, networks_folder, shipped
 from sim2real.logs import Log
 from sim2real.replay.camera import camera_side
@@ -101,12 +104,15 @@ def estimate_log(
 def _outcome(done: Replay) -> dict[str, float | None]:
     """The car's estimate at the end, and how sure it was where the tyre was seen."""
     theta, std, peak = done.ours.of_the_car
-    seen = done.seen.any(axis=1) & done.inputs.moving
+    moving = done.inputs.moving
+    seen = done.seen.any(axis=1) & moving
+    low, high = done.of_the_car["TRPAC_low"], done.of_the_car["TRPAC_high"]
     return {
         "TRPAC_end": float(theta[-1]),
         "TRPAC_std_end": float(std[-1]),
         "TRPAC_peak_end": float(peak[-1]),
         **{f"{name}_end": float(values[-1]) for name, values in done.of_the_car.items()},
         "mean_std_seen": float(std[seen].mean()) if seen.any() else None,
-        "mean_std": float(std[done.inputs.moving].mean()),
+        "known_share": float(np.mean(is_known(*interval(done.method, theta, std, low, high))[moving])),
+        "mean_std": float(std[moving].mean()),
     }

@@ -10,20 +10,17 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from scenarios.html_page import data_address, page
+from scenarios import known
+from scenarios.html_page import page, percent
 from scenarios.whole_files import written_whole
 from sim2real.replay import figures
 from sim2real.replay.run import DYNAMICS, Replay
-from sim2real.reporting.report import DASH, jsonable
+from sim2real.reporting.report import jsonable
 from trpac_core.estimator_data import Method, Source
 from trpac_core.vehicle import WHEELS
 
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
 CSV_NAME, SUMMARY_NAME, REPORT_NAME = "estimates.csv", "summary.json", "report.html"
-HARDLY = 0.01
-"""Share of the driving below which the tyre counts as not seen [-]."""
-WIDE_STD = 0.15
-"""Mean standard deviation above which an estimate says little [-]."""
 
 
 def estimates_table(done: Replay) -> pd.DataFrame:
@@ -76,56 +73,42 @@ def write_replay(done: Replay, summary: dict[str, Any], folder: Path) -> tuple[P
 
 def render(done: Replay, summary: dict[str, Any]) -> str:
     """The report as one HTML page that needs nothing beside it."""
-    pictures = {
-        "estimate": data_address(figures.estimate(done)),
-        "wheels": data_address(figures.wheels(done)),
-        "curve": data_address(figures.curve(done)),
-    }
-    if len(done.traces) > 2:
-        pictures["compared"] = data_address(figures.compared(done))
     return page(
         TEMPLATE,
-        {"number": number, "percent": percent},
         s=summary,
-        pictures=pictures,
-        verdict=verdict(summary),
+        estimate=figures.estimate(done),
+        wheels=figures.wheels(done),
+        curve=figures.curve(done),
+        compared=figures.compared(done) if len(done.traces) > 2 else None,
+        sentences=sentences(summary),
         ours=done.method.title,
         interval=done.method is Method.ROBUST,
-        dynamics=DYNAMICS,
     )
 
 
 def verdict(summary: dict[str, Any]) -> str:
     """What the log showed, in sentences that follow from its numbers."""
-    said, driven = summary["excitation"], summary["estimate"]
-    sentences = [
-        f"The car drove for {said['driven_s']:.1f} s; "
-        f"the tyres showed the road for {percent(said['seen_share'])} of it."
-    ]
-    if said["seen_share"] < HARDLY and said["camera_share"] < HARDLY:
-        sentences.append(
-            "So the estimate is hardly more than its start value: brake or accelerate harder, up to a slip of 0.02."
+    return " ".join(sentences(summary))
+
+
+def sentences(summary: dict[str, Any]) -> list[str]:
+    """The estimate at the end; how much the tyres showed; how far the estimate is off a reference."""
+    said, driven, method = summary["excitation"], summary["estimate"], Method.of(summary["method"])
+    theta, std, low, high = (driven[f"{n}_end"] for n in ("TRPAC", "TRPAC_std", "TRPAC_low", "TRPAC_high"))
+    first, *wide = known.sentences(theta, std, *known.interval(method, theta, std, low, high))
+    found = [f"At the end: {first}", *wide]
+    share = percent(said["seen_share"])
+    shown = f"The car drove for {said['driven_s']:.1f} s; the tyres showed the road for {share} of it"
+    if not said["excited_share"]:
+        shown += (
+            ", since no tyre slipped above its threshold: brake or accelerate harder, up to a slip of 0.02"
         )
-    sentences.append(
-        f"TRPAC at the end is {driven['TRPAC_end']:.2f} with a standard deviation of {driven['TRPAC_std_end']:.2f}."
-    )
-    if driven["mean_std_seen"] is not None and driven["mean_std_seen"] > WIDE_STD:
-        sentences.append("Its deviation is wide even where the tyre is seen: take it as a hint.")
-    ours = Method.of(summary["method"]).title
-    error = (summary["errors"] or {}).get(ours, {}).get("seen", {})
+    found.append(f"{shown}. TRPAC was known for {percent(driven['known_share'])} of it.")
+    error = (summary["errors"] or {}).get(method.title, {}).get("seen", {})
     if error.get("mean_abs") is not None:
-        sentences.append(
-            f"Where the tyre is seen, TRPAC_peak is {error['mean_abs']:.3f} off the reference in the mean, and "
-            f"{percent(error['within_2_std'])} of these rows lie within two standard deviations."
+        found.append(
+            "Where the tyres showed the road, the mean absolute error of TRPAC_peak against the reference is "
+            f"{error['mean_abs']:.3f}, and {percent(error['within_2_std'])} of these rows lie within two standard "
+            "deviations."
         )
-    return " ".join(sentences)
-
-
-def number(value: float | None, digits: int = 3) -> str:
-    """A number as the tables show it; a dash where there is none."""
-    return DASH if value is None or not np.isfinite(value) else f"{value:.{digits}f}"
-
-
-def percent(share: float | None) -> str:
-    """A share of 1 as per cent."""
-    return DASH if share is None or not np.isfinite(share) else f"{100.0 * share:.0f} %"
+    return found

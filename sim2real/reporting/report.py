@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from scenarios.effects import EFFECTS
-from scenarios.html_page import data_address, page
+from scenarios.html_page import MISSING, data_address, page
+from scenarios.plots import Figure
 from scenarios.whole_files import written_whole
 from sim2real.how_far.rating import rate
 from sim2real.reporting import figures
@@ -33,7 +34,6 @@ from trpac_core.vehicle import WHEELS
 
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
 JSON_NAME, REPORT_NAME = "diagnosis.json", "report.html"
-DASH = "–"
 
 LEADING_FROM = 0.02
 """Probability from which a cause gets a card of its own [-]."""
@@ -86,14 +86,6 @@ def jsonable(value: Any) -> Any:
 
 
 @dataclass(frozen=True)
-class Picture:
-    """A picture of the report: its data address, and what it shows."""
-
-    source: str
-    alt: str
-
-
-@dataclass(frozen=True)
 class Part:
     """A part of the gap budget, as the bar and its table show it."""
 
@@ -108,8 +100,6 @@ class Part:
 def render(diagnosis: Diagnosis) -> str:
     """The report as one HTML page that needs nothing beside it."""
     filters: dict[str, Callable[..., str | bool]] = {
-        "number": number,
-        "percent": percent,
         "estimate": estimate,
         "is_number": math.isfinite,
         "words": figures.words,
@@ -123,7 +113,7 @@ def render(diagnosis: Diagnosis) -> str:
         TEMPLATE,
         filters,
         d=diagnosis,
-        colours=figures,
+        zoom_s=figures.ZOOM_S,
         effects=EFFECTS,
         needed=needed(diagnosis),
         added=names,
@@ -137,8 +127,8 @@ def render(diagnosis: Diagnosis) -> str:
         heat=heat_rows(diagnosis),
         regimes=list(dict.fromkeys(regime for row in diagnosis.heat_map.values() for regime in row)),
         provenance=provenance_rows(diagnosis.provenance),
-        pictures=_pictures(diagnosis, traces[:1], names),
-        traces=[(t, _picture(figures.trace(t, names), f"{t.signal} over time")) for t in traces],
+        drawn=_figures(diagnosis, traces[:1], names),
+        traces=[(t, figures.trace(t, names)) for t in traces],
         profile=None if diagnosis.next_manoeuvre is None else profile_csv(diagnosis.next_manoeuvre),
     )
 
@@ -255,47 +245,23 @@ def provenance_rows(value: Any, label: str = "") -> list[tuple[str, str, str]]:
     return [(label, f"{value:g}" if isinstance(value, float) else str(value), "")]
 
 
-def _pictures(diagnosis: Diagnosis, worst: list[Trace], names: str) -> dict[str, Picture]:
-    """The pictures that this diagnosis has; `worst` is the trace furthest off, if any, `names` the added effects'."""
+def _figures(diagnosis: Diagnosis, worst: list[Trace], names: str) -> dict[str, Figure]:
+    """The plots that this diagnosis has; `worst` is the trace furthest off, if any, `names` the added effects'."""
     made = {}
-    if diagnosis.verdict is not Verdict.NO_GAP:
-        for shown in worst:
-            made["largest"] = _picture(
-                figures.largest_gap(shown, names), f"{shown.signal} where it is furthest off"
-            )
+    if worst and diagnosis.verdict is not Verdict.NO_GAP:
+        made["largest"] = figures.largest_gap(worst[0], names)
     if diagnosis.unexplained is not None and len(diagnosis.unexplained.x):
-        term = diagnosis.unexplained
-        made["term"] = _picture(figures.missing_term(term), f"The missing term over {term.depends_on}")
+        made["term"] = figures.missing_term(diagnosis.unexplained)
     if diagnosis.next_manoeuvre is not None:
-        made["profile"] = _picture(figures.profile(diagnosis.next_manoeuvre), "Torque per wheel over time")
+        made["profile"] = figures.profile(diagnosis.next_manoeuvre)
     return made
-
-
-def _picture(png: bytes, alt: str) -> Picture:
-    return Picture(data_address(png, "image/png"), alt)
-
-
-def number(value: float | None, digits: int = 2) -> str:
-    """A number as the tables show it; a dash where there is none."""
-    return DASH if value is None or not math.isfinite(value) else f"{value:.{digits}f}"
-
-
-def percent(share: float | None) -> str:
-    """A share of 1 as per cent, with a digit more near none and all; what is not all is never shown as all."""
-    if share is None or not math.isfinite(share):
-        return DASH
-    if 0.0 < share < 0.0005:
-        return "< 0.1 %"
-    if 0.9995 <= share < 1.0:
-        return "> 99.9 %"
-    return f"{100.0 * share:.1f} %" if 0.0 < share < 0.01 or 0.99 < share < 1.0 else f"{100.0 * share:.0f} %"
 
 
 def estimate(interval: Interval) -> str:
     """A value with its interval and unit, with as many digits as the interval's width makes sense of."""
     unit = "" if interval.unit in ("-", "") else f" {figures.pretty_unit(interval.unit)}"
     if not math.isfinite(interval.value):
-        return DASH
+        return MISSING
     known = math.isfinite(interval.low) and math.isfinite(interval.high)
     width = interval.high - interval.low if known else 0.0
     scale = max(width, 0.01 * abs(interval.value) if width <= 0.0 else 1e-6 * abs(interval.value))

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 import yaml
 from distributed import Client, LocalCluster
+from report_page import require_report
 from typer.testing import CliRunner
 
 from scenarios.errors import ScenarioError
@@ -404,11 +405,36 @@ def test_the_command_writes_table_and_report(tmp_path):
     table = pd.read_parquet(out / "runs.parquet")
     assert len(table) == 2 * 2 * 2 * 3
     assert table["run"].is_monotonic_increasing
-    report = (out / "report.html").read_text()
-    assert 'src="http' not in report
-    assert "Degradation over camera.wrong_share" in report
+    page = require_report((out / "report.html").read_text())
+    assert "Degradation over camera.wrong_share" in page.text
+    assert page.verdict.startswith("Of 4 runs: ")
+    assert page.verdict in " ".join(result.stdout.split())
     levels = json.loads((out / "summary.json").read_text())["levels"]
     assert [level["level"] for level in levels] == [0.0, 1.0]
+
+
+def test_the_number_of_runs_may_be_given(sweep_of):
+    axis = {"parameter": "camera.wrong_share", "levels": [0.0, 1.0]}
+    path = sweep_of(vary=[axis]).path
+    assert len(run_keys(load_sweep(path))) == 2 * SHORT["runs"]
+    asked = load_sweep(path, runs=7)
+    assert len(run_keys(asked)) == 14
+    assert plan_run(asked, run_keys(asked)[3]) == plan_run(load_sweep(path), run_keys(load_sweep(path))[3])
+    for runs in (0, 500_001):
+        with pytest.raises(ScenarioError, match=f"--runs is {runs}; expected 1 to 500000 for 2 levels"):
+            load_sweep(path, runs=runs)
+
+
+@pytest.mark.e2e
+def test_the_command_takes_the_number_of_runs_and_counts_them_first(tmp_path):
+    path, out = tmp_path / "sweep.yaml", tmp_path / "out"
+    path.write_text(yaml.safe_dump(SHORT))
+    result = CliRunner().invoke(app, ["sweep", str(path), "--runs", "1", "--out", str(out), "--jobs", "1"])
+    assert result.exit_code == 0, result.output
+    assert pd.read_parquet(out / "runs.parquet")["run"].nunique() == 1
+    assert "Of 1 run: " in result.output
+    refused = CliRunner().invoke(app, ["sweep", str(path), "--runs", "0", "--out", str(out)])
+    assert refused.exit_code == 2
 
 
 def test_a_run_that_never_converges_counts_as_the_slowest():

@@ -22,14 +22,17 @@ import pandas as pd
 import psutil
 import pytest
 import yaml
+from report_page import Page, require_report
 from typer.testing import CliRunner
 
 from scenarios.errors import ScenarioError
+from scenarios.plots import png
 from scenarios.sweep import figures
 from scenarios.sweep.cluster import connected, security_of
 from scenarios.sweep.draw import plan_run, run_keys
 from scenarios.sweep.execute import Failure, execute, run_one
 from scenarios.sweep.files import RANGES, Sweep, load_sweep
+from scenarios.sweep.outcome import outcome
 from scenarios.sweep.report import write_report
 from scenarios.sweep.run import run_plan
 from scenarios.sweep.store import COLUMNS, Parts, as_table, identity
@@ -510,7 +513,7 @@ def test_names_of_the_file_are_text_in_every_result(
     sweep, _ = finished
     file = sweep.file.model_copy(update={"name": MARKUP, "description": MARKUP * 100})
     strange = Sweep(sweep.path, file, sweep.scenario)
-    monkeypatch.setattr("scenarios.sweep.files.load_sweep", lambda path, allow_code: strange)
+    monkeypatch.setattr("scenarios.sweep.files.load_sweep", lambda path, **options: strange)
     out = tmp_path / "[bold]$a$[" / "[red]\x1b[31m"
     shutil.copytree(finished[1], out)
     (out / "sweep.json").write_text(json.dumps(identity(strange)))
@@ -525,7 +528,7 @@ def test_names_of_the_file_are_text_in_every_result(
     assert "<i>[/bold] $x_{$ :bug: [red]\\x1b[31m \\x9b 50% \\ud800" in text
     assert f"Report: {tmp_path}/[bold]$a$[/[red]\\x1b[31m/report.html" in text
     assert "\x1b" not in text
-    report = (out / "report.html").read_text()
+    report = Page((out / "report.html").read_text()).source
     assert "&lt;i&gt;[/bold] $x_{$ :bug:" in report
     assert "<i>" not in report
     assert json.loads((out / "summary.json").read_text())["name"] == MARKUP
@@ -535,12 +538,12 @@ def test_names_of_the_file_are_text_in_every_result(
 def test_dollars_are_no_formula_in_pictures(finished: tuple[Sweep, Path], name: str) -> None:
     table = Parts(finished[1], identity(finished[0])).table()
     table["estimator"] = table["estimator"].replace({"DE": name})
-    assert figures.distributions(table)
-    assert figures.errors_by_friction(table)
+    assert png(figures.distributions(table))
+    assert png(figures.errors_by_friction(table))
     table["estimator"] = table["estimator"].replace({"DIFE": name + name})
-    assert figures.coverage_figure(table)
+    assert png(figures.coverage(table))
     table["parameter"], table["level"] = name, 1.0
-    assert list(figures.degradations(table))
+    assert [png(figure) for _, figure in figures.degradations(table)]
 
 
 def test_why_a_run_failed_is_one_plain_line_in_the_report(
@@ -548,8 +551,13 @@ def test_why_a_run_failed_is_one_plain_line_in_the_report(
 ) -> None:
     table = Parts(finished[1], identity(finished[0])).table()
     failures = [Failure(1, "<script>alert(1)</script>")]
-    write_report(finished[0], table, summarise(table), failures, tmp_path / "report.html")
-    assert "<script>" not in (tmp_path / "report.html").read_text()
+    became = outcome(table, failures)
+    write_report(finished[0], table, summarise(table), became, tmp_path / "report.html")
+    page = require_report((tmp_path / "report.html").read_text())
+    assert "<script>alert" not in page.source
+    assert "1 <script>alert(1)</script>" in page.text
+    assert page.verdict == became.sentence
+    assert "1 failed with an error" in page.verdict
 
 
 # What the file asks for

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from log_maker import make_frame, save
+from report_page import require_report
 from typer.testing import CliRunner
 
 import trpac
@@ -128,14 +129,16 @@ class TestCommand:
         assert summary["errors"]["robust"]["all"]["mean_abs"] == pytest.approx(error.mean(), abs=1e-3)
 
     def test_the_report_needs_nothing_beside_it(self, estimated):
-        text = (estimated[0] / "report.html").read_text()
-        assert text.count('src="data:image/png;base64,') == 4
-        assert "http" not in text
-        assert "drive.csv" in text
+        page = require_report((estimated[0] / "report.html").read_text())
+        assert "http" not in page.source
+        assert "drive.csv" in page.text
+        names = {trace["name"] for spec in page.specs for trace in spec["data"]}
+        assert {"fl", "fr", "rl", "rr", "mu_reference", "EKF", "UKF", "slip-slope", "95 % interval"} <= names
 
     def test_it_says_what_it_found(self, estimated):
         said = " ".join(estimated[1].stdout.split())
         assert "the tyres showed the road for" in said
+        assert require_report((estimated[0] / "report.html").read_text()).verdict in said
         assert "TRPAC_peak against mu_reference" in said
 
     @pytest.mark.parametrize("method", ["as_printed", "robust"])
@@ -147,7 +150,7 @@ class TestCommand:
         assert summary["method"] == method
         assert title in summary["errors"]
         assert "DIFE" not in summary["errors"]
-        assert f"<td>{title}</td>" in (tmp_path / "out" / "report.html").read_text()
+        assert f'<th scope="row">{title}</th>' in (tmp_path / "out" / "report.html").read_text()
         table = pd.read_csv(tmp_path / "out" / "estimates.csv")
         python = trpac.estimate(driven, TABLE_3, method=method).frame
         for name in ("TRPAC", "TRPAC_low", "TRPAC_high", "TRPAC_expected", "TRPAC_high_rr"):

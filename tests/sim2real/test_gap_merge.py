@@ -7,6 +7,7 @@ from itertools import product
 import made_up_diagnosis as made_up
 import numpy as np
 import pytest
+from report_page import require_report
 
 from scenarios.files import RoadFile, load_vehicle
 from sim2real.auxiliary import AuxiliaryVerdict, camera_verdict, counter_verdict
@@ -473,7 +474,7 @@ def test_what_a_camera_cannot_tell_apart_comes_with_two_speeds_to_drive():
     assert profile["separates"] == ["camera_latency", "camera_pitch"]
     assert np.shape(profile["wheel_torque_nm"]) == (len(profile["time_s"]), 4)
     assert jsonable(profile)["power_sigma"] is None
-    assert "None" not in render(told)
+    assert "None" not in require_report(render(told)).text
 
 
 DARK = candidate(("exposure_shift",), 1.5, stops=Interval(1.5, -4.0, 4.0, "stops"))

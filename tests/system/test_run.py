@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from report_page import require_report
 from typer.testing import CliRunner
 
 from fmu_src.kinds import NATIVE, build
@@ -103,11 +104,15 @@ def test_run_writes_report_figure_log_and_scores(scenario_file, unit_file, tmp_p
     log = pd.read_csv(out / "log.csv")
     assert {"time_s", "TRPAC", "flag", "K_v", "theta_true"} <= set(log.columns)
     assert np.isfinite(log["TRPAC"]).all()
-    report = (out / "report.html").read_text()
-    assert "short &lt;i&gt;" in report
-    assert "<i>" not in report
-    assert 'src="http' not in report
-    assert report.count("data:image/") == 2
+    page = require_report((out / "report.html").read_text())
+    assert "short &lt;i&gt;" in page.source
+    assert "<i>" not in page.source
+    assert page.source.count("data:image/") == 1
+    assert len(page.specs) == 7
+    assert page.verdict in " ".join(result.stdout.split())
+    assert page.verdict.startswith(
+        "0.9 stretch from 0 m: not known, the wheel torque was too small to show it"
+    )
 
 
 @pytest.mark.e2e
@@ -126,6 +131,10 @@ def test_another_method_is_that_of_the_unit_and_of_the_report(scenario_file, uni
     assert (summary["method"], list(summary["estimators"])) == (method, ["IFE", "DE", title])
     assert title in result.output
     assert "DIFE" not in result.output
+    page = require_report((out / "report.html").read_text())
+    assert "no picture gave a class of the road under the wheel" in page.text
+    assert "the camera's class is not used" in page.text
+    assert len(page.specs) == 4 + log["excitation_flag"].any()
     scenario = load_scenario(scenario_file)
     noise = scenario.sensors
     config = EstimatorConfig(

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.report import markdown, write_between
+from scenarios.plot_style import BLUE, GREEN, INK
 from trpac_core.vision.classes import Surface
 
 from .judge import SCENARIOS, VARIANTS, VOTING
@@ -241,13 +242,16 @@ def draw(measured: Measured, path: Path) -> None:
     named = dict(groups(measured.table))
     figure = Figure(figsize=(10, 4.6), layout="constrained")
     for axis, scenario in zip(figure.subplots(1, 2, sharey=True), SCENARIOS, strict=True):
-        for offset, method, colour in ((-0.2, VOTING, "#9aa5b1"), (0.2, "IFE", "#1f5fa8")):
+        for offset, method, colour, hatch in (
+            (-0.2, VOTING, GREEN.light, "//"),
+            (0.2, "IFE", BLUE.light, ""),
+        ):
             found = [n_w(_in(table, scenario, method)) for table in named.values()]
             at = np.arange(len(found)) + offset
             values = np.array([s.value for s in found])
             reach = np.array([[s.value - s.low for s in found], [s.high - s.value for s in found]])
-            axis.bar(at, values, 0.38, color=colour, label=method)
-            axis.errorbar(at, values, np.maximum(reach, 0.0), fmt="none", ecolor="#222222", capsize=3, lw=1)
+            axis.bar(at, values, 0.38, color=colour, hatch=hatch, label=method)
+            axis.errorbar(at, values, np.maximum(reach, 0.0), fmt="none", ecolor=INK.light, capsize=3, lw=1)
             axis.axhline(PAPER[scenario, method], color=colour, ls="--", lw=1.2)
             axis.text(len(found) - 0.5, PAPER[scenario, method], f"paper,\n{method}", va="bottom", fontsize=8)
         axis.set_xticks(range(len(named)), [name.replace(" ", "\n", 1) for name in named], fontsize=8)
