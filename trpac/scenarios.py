@@ -116,6 +116,13 @@ class ScenarioRun:
         """The result of each scenario of `compare_camera` in words."""
         return tuple(comparison.onset.sentence for comparison in self._comparisons)
 
+    @property
+    def verdict(self) -> str:
+        """Results of the run in sentences, one per stretch of road."""
+        from scenarios.report import verdict
+
+        return verdict(self.summary)
+
     def figure17(self) -> Picture:
         """The paper's Figure 17 of this run."""
         from scenarios.figure17 import draw_figure17

@@ -9,9 +9,9 @@ from scenarios.known import interval
 from scenarios.plot_style import (
     BAND,
     BLUE,
+    GREY,
     PLAIN,
     PURPLE,
-    GREY,
     TRUTH,
     WHEEL_STYLES,
     Style,
