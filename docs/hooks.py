@@ -90,9 +90,21 @@ def on_page_content(html: str, **_: Any) -> str:
         tag, latex = found.groups()
         for escaped, plain in UNESCAPED.items():
             latex = latex.replace(escaped, plain)
-        return convert(latex.strip(), display="block" if tag == "div" else "inline")
+        if tag == "span":
+            return convert(latex.strip())
+        return convert(latex.strip(), display="block").replace(
+            "<math ", '<math tabindex="0" ', 1
+        )  # it scrolls
 
     return MATH.sub(shown, html)
+
+
+def on_post_page(output: str, **_: Any) -> str:
+    """Name the theme's search for a screen reader."""
+    return output.replace(
+        'data-md-component="search" role="dialog"',
+        'data-md-component="search" role="dialog" aria-label="Search"',
+    )
 
 
 def _api() -> str:
