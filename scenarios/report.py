@@ -73,6 +73,6 @@ def _sentence(end: dict[str, Any], score: dict[str, Any]) -> tuple[int, str]:
         source = " from the camera" if end["camera"] else ""
         return 0, f"{name}: not known, {why} (TRPAC at its end{source}: {value})."
     if score["convergence_time_s"] is None:
-        return 1, f"{name}: not reached, TRPAC at its end is {value}."
+        return 1, f"{name}: true value not reached, TRPAC at its end is {value}."
     within = f"within {score['convergence_time_s']:.2f} s of excited time"
     return 2, f"{name}: {value} at its end, converged {within}."

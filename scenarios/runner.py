@@ -161,6 +161,7 @@ def summarise(scenario: Scenario, table: pd.DataFrame, fmu: Path, method: Method
         "method": method.label,
         "longitudinal_stiffness_n": scenario.vehicle.tyre.longitudinal_stiffness_n,
         "excited_time_of": f"{method.title}'s start/stop flag, one clock for all estimators",
+        "scenario_sha256": file_sha256(scenario.path),
         "fmu_sha256": file_sha256(fmu),
         "versions": {package: version(package) for package in PACKAGES},
         "estimators": scores,

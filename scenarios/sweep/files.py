@@ -14,7 +14,7 @@ from scenarios.files import Scenario, SurfaceName, load_scenario
 from scenarios.library import located, shipped
 from scenarios.strict import load_strict
 from scenarios.sweep.trackers import ADDRESS, problem_of_address, problem_of_tracker
-from trpac_core.files import quoted
+from trpac_core.files import file_sha256, quoted
 from trpac_core.parameters.settings import ESTIMATOR_PARAMETERS
 
 MOST_RUNS = 1_000_000
@@ -293,6 +293,8 @@ class Sweep:
     path: Path
     file: SweepFile
     scenario: Scenario
+    sha256: str = ""
+    """SHA-256 of the file."""
 
 
 def _with_runs(file: SweepFile, runs: int) -> SweepFile:
@@ -358,4 +360,4 @@ def load_sweep(path: str | Path, *, allow_code: bool = False, runs: int | None =
         )
     if problems:
         raise ScenarioError("\n".join(problems))
-    return Sweep(path, file, scenario)
+    return Sweep(path, file, scenario, file_sha256(path))

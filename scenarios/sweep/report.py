@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from scenarios.sweep.store import source_digest
 from scenarios.sweep.summary import ENOUGH_SHOWN_S
 
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
+PACKAGES = ("trpac-fmu", "numpy", "numba", "scipy")
 MOST_LISTED = 500
 """Runs that the report lists; further ones are in runs.parquet."""
 
@@ -34,6 +36,8 @@ def write_report(
         enough_s=ENOUGH_SHOWN_S,
         most=MOST_LISTED,
         source=source_digest(),
+        sha256=sweep.sha256,
+        versions={name: version(name) for name in PACKAGES},
         figures=_figures(table),
     )
     path.write_bytes(text.encode("utf-8", "backslashreplace"))  # a name may hold half a surrogate pair

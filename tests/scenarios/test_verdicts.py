@@ -65,7 +65,7 @@ class TestRun:
             (
                 {"convergence_time_s": None},
                 {},
-                "0.9 stretch from 0 m: not reached, TRPAC at its end is 0.69.",
+                "0.9 stretch from 0 m: true value not reached, TRPAC at its end is 0.69.",
             ),
             ({}, {}, "0.9 stretch from 0 m: 0.69 at its end, converged within 0.12 s of excited time."),
         ],
