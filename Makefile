@@ -20,9 +20,10 @@ $(READY): requirements/dev.txt pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
 	@touch $@
 
-demo: $(READY)   ## build the unit, drive it over the paper's road, write out/demo
+demo: $(READY)   ## build the unit, drive it over the paper's road and onto snow and wet, write out/demo
 	$(BIN)/python build_fmu.py --out dist
-	$(BIN)/trpac run scenarios/paper_simulation.yaml --fmu dist/TrpacEstimator.fmu --out out/demo
+	$(BIN)/trpac run scenarios/paper_simulation.yaml --fmu dist/TrpacEstimator.fmu --out out/demo \
+	  --compare-camera scenarios/cruise_onto_snow.yaml --compare-camera scenarios/cruise_onto_wet.yaml
 
 COMPILING := tests/sim2real/test_gap_observer.py::test_a_log_without_measurements_is_the_plain_simulation_from_rest \
   tests/benchmarks/test_withheld_plant.py::test_neutral_effect_is_the_nominal_car \
@@ -35,7 +36,7 @@ test:            ## lint, types and the test suite
 test-all:        ## the same with the tests that take long (twice the time)
 test test-all: export OPENBLAS_NUM_THREADS = 1
 test test-all: $(READY) style
-	@$(MAKE) --no-print-directory -j 3 types compiled collected site
+	@$(MAKE) --no-print-directory -j 3 types compiled collected site TRPAC_SITE_NOTEBOOKS=false  # the tests run them
 	$(BIN)/python -m pytest -n 3 --dist loadfile --hypothesis-seed 0 $(CHOSEN)
 
 check: style types  ## lint and types
@@ -54,9 +55,13 @@ compiled: $(READY)
 collected: $(READY)
 	@$(BIN)/python -m pytest -q --collect-only >/dev/null || true  # else each worker would rewrite all assertions; what is wrong the suite tells
 
+# Notebooks start in an empty folder, lest their files lie among the documents, and are run anew.
+site: NOTEBOOK_START := $(CURDIR)/out/notebook_start
 site: $(READY)   ## the site into out/site, its notebooks run, its links checked
 	@echo "building the site"
-	@mkdir -p out; NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict >out/site.log 2>&1 || { cat out/site.log; exit 1; }
+	@rm -rf .cache/mkdocs-jupyter $(NOTEBOOK_START); mkdir -p $(NOTEBOOK_START)/profile_default/startup
+	@echo 'import os, tempfile; os.chdir(tempfile.mkdtemp(prefix="trpac_notebook_"))' > $(NOTEBOOK_START)/profile_default/startup/folder.py
+	@IPYTHONDIR=$(NOTEBOOK_START) NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict >out/site.log 2>&1 || { cat out/site.log; exit 1; }
 
 format: $(READY) ## rewrite the sources in the house format
 	$(BIN)/ruff check --fix .

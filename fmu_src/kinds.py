@@ -5,6 +5,7 @@ What building needs is imported when a unit is built, so that a command line can
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 PYTHON, NATIVE = KINDS = ("python", "native")
@@ -30,6 +31,7 @@ def build(
     fmi: int = 2,
     flat: bool = False,
     everywhere: bool | None = None,
+    networks: Path | None = None,
 ) -> Path:
     """Build a unit into a folder; returns its path, NAME.fmu with _native, _fmi3 and _flat before the dot.
 
@@ -45,6 +47,8 @@ def build(
         Names without dots, see `model_description`.
     everywhere : bool, optional
         Platforms of a native unit, see `build_native`.
+    networks : Path, optional
+        Folder with the networks of a unit that holds some, in place of the package's.
 
     Raises
     ------
@@ -68,5 +72,12 @@ def build(
     )
     target = folder / f"{name}{ending}"
     if kind == NATIVE:
+        if networks is not None:
+            raise BuildError("A native unit holds no networks; leave them out.")
         return build_native(UNITS[name].info, target, fmi=fmi, flat=flat, everywhere=everywhere)
-    return build_unit(UNITS[name], target, flat=flat)
+    slave = UNITS[name]
+    if networks is not None:
+        if not slave.resources:
+            raise BuildError(f"{name} holds no networks; leave them out.")
+        slave = replace(slave, resources=tuple(networks / path.name for path in slave.resources))
+    return build_unit(slave, target, flat=flat)

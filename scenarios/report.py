@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from scenarios.brake_onset import Comparison
 from scenarios.figure17 import figure17
 from scenarios.html_page import data_address, page
 from scenarios.runner import Run
@@ -13,8 +15,17 @@ from trpac_core.estimator_data import Method
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
 
 
-def write_report(run: Run, overlay: Path | None, path: Path) -> None:
-    """Write the report of a run with its plots and, where there was a camera, its sheet of pictures."""
+def write_report(
+    run: Run,
+    overlay: Path | None,
+    path: Path,
+    comparisons: Sequence[Comparison] = (),
+    onset_figure: Path | None = None,
+) -> None:
+    """Write the report of a run with its plots and, where there was a camera, its sheet of pictures.
+
+    With comparisons it begins with their brake onsets and the figure of them.
+    """
     text = page(
         TEMPLATE,
         run=run,
@@ -23,6 +34,8 @@ def write_report(run: Run, overlay: Path | None, path: Path) -> None:
         rows=score_rows(run.summary),
         sentences=sentences(run.summary),
         figure=figure17(run),
+        onsets=[compared.onset for compared in comparisons],
+        onset_figure=data_address(onset_figure.read_bytes()) if onset_figure is not None else None,
         overlay=data_address(overlay.read_bytes(), "image/jpeg") if overlay is not None else None,
     )
     path.write_text(text, encoding="utf-8")

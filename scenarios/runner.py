@@ -124,12 +124,18 @@ def unit_signals(log: pd.DataFrame, wheel: str) -> pd.DataFrame:
 
 def under_the_wheel(scenario: Scenario, trajectory: PlantTrajectory) -> pd.DataFrame:
     """Columns theta_true and segment: adhesion and index of the road's stretch at the wheel's contact."""
-    car, column = scenario.vehicle.to_core(), WHEELS.index(scenario.wheel)
-    offset_m = car.cog_to_front_axle_m if scenario.wheel.startswith("f") else -car.cog_to_rear_axle_m
-    starts = segment_starts(scenario)
-    contact_m = trajectory.position_m + offset_m
-    segment = np.clip(np.searchsorted(starts, contact_m, side="right") - 1, 0, None)
+    starts, column = segment_starts(scenario), WHEELS.index(scenario.wheel)
+    segment = np.clip(
+        np.searchsorted(starts, wheel_position_m(scenario, trajectory), side="right") - 1, 0, None
+    )
     return pd.DataFrame({"theta_true": trajectory.theta[:, column], "segment": segment})
+
+
+def wheel_position_m(scenario: Scenario, trajectory: PlantTrajectory) -> NDArray[np.float64]:
+    """Position of the wheel's contact on the road at each row [m]."""
+    car = scenario.vehicle.to_core()
+    offset_m = car.cog_to_front_axle_m if scenario.wheel.startswith("f") else -car.cog_to_rear_axle_m
+    return np.asarray(trajectory.position_m + offset_m, dtype=np.float64)
 
 
 def segment_starts(scenario: Scenario) -> NDArray[np.float64]:

@@ -69,13 +69,17 @@ def picture_of(
     return np.ascontiguousarray(array[..., ::-1] if order == "rgb" else array)
 
 
-@lru_cache(maxsize=1)
-def _networks() -> StillNetworks:
-    return StillNetworks.load(networks_folder())
+@lru_cache(maxsize=2)
+def _networks(folder: Path) -> StillNetworks:
+    return StillNetworks.load(folder)
 
 
 def classify(
-    image: str | Path | NDArray[np.generic], *, order: Order = "bgr", bits: int | None = None
+    image: str | Path | NDArray[np.generic],
+    *,
+    order: Order = "bgr",
+    bits: int | None = None,
+    networks: str | Path | None = None,
 ) -> PictureClass:
     """The surface of the road in a single picture, of any camera.
 
@@ -87,14 +91,17 @@ def classify(
         Channel order of an array.
     bits : int, optional
         How many bits a picture of 16 uses; by default 12 where all values are below 4096.
+    networks : path, optional
+        Folder with segmenter.onnx and surface.onnx; by default those of the package. Files are read once.
 
     Raises
     ------
     TrpacError
-        A picture that cannot be read, or without usable road.
+        A picture that cannot be read, or without usable road; a network that cannot be used.
     """
     name = str(image) if isinstance(image, (str, Path)) else "image"
-    shares = _networks().probabilities(picture_of(image, order, bits, upright=True), name)
+    folder = networks_folder() if networks is None else Path(networks).resolve()
+    shares = _networks(folder).probabilities(picture_of(image, order, bits, upright=True), name)
     best = int(shares.argmax())
     probabilities = {surface.label: float(shares[surface]) for surface in Surface}
     return PictureClass(Surface(best).label, float(shares[best]), probabilities, bool(shares[best] > 0.5))
@@ -107,16 +114,20 @@ class VisionEstimator:
     ----------
     camera : path, name or Camera
         Lens and mounting, as in camera.yaml.
+    networks : path, optional
+        As of `classify`.
 
     Raises
     ------
     TrpacError
-        A camera file that is wrong.
+        A camera file that is wrong; a network that cannot be used.
     """
 
-    def __init__(self, camera: str | Path | Camera) -> None:
+    def __init__(self, camera: str | Path | Camera, *, networks: str | Path | None = None) -> None:
         lens = camera if isinstance(camera, Camera) else load_camera(camera)
-        self._ife = Ife.load(IfeConfig(camera=lens), networks_folder())
+        self._ife = Ife.load(
+            IfeConfig(camera=lens), networks_folder() if networks is None else Path(networks)
+        )
         self._state, self._time_s, self._way_m = IfeState(), 0.0, 0.0
 
     def step(

@@ -289,17 +289,18 @@ def _excitation(fit: Sequence[Motion], car: Car) -> list[str]:
     deviation = float(np.std(accel))
     what = []
     if len(held) == 1:
-        what.append(f"hold only {held[0]}")
+        what.append(f"contain only {held[0]}")
     if deviation < MOVED_M_S2:
         what.append(
-            f"excite little (the acceleration's standard deviation is {deviation:.2f} m/s^2, expected {MOVED_M_S2:g} "
+            f"have little excitation (the acceleration's standard deviation is {deviation:.2f} m/s^2, expected "
+            f"{MOVED_M_S2:g} "
             "and more)"
         )
     if not what:
         return []
     return [
-        f"The fit logs {' and '.join(what)}: effects that show in other driving are not found or not told apart, and a "
-        f"verdict of no gap says little. {RECORD}"
+        f"The fit logs {' and '.join(what)}: effects that need other driving are not found or not separated, and "
+        f"a verdict of no gap has little weight. {RECORD}"
     ]
 
 
@@ -367,15 +368,15 @@ def _masses(of: dict[str, Mass], car: Car) -> tuple[list[str], list[str]]:
         share = float(np.median([m for name in unlike if (m := told[name].unlike) is not None]))
         warnings.append(
             f"{', '.join(unlike)}: per change of speed the logged torque in braking is {share:.2g} of that in driving. "
-            "Expected the commanded torque of motors and of friction brakes, both in N m at the wheel: what is missing "
-            "of one is told as an effect."
+            "Expected the commanded torque of motors and of friction brakes, both in N m at the wheel: missing "
+            "torque is named as an effect."
         )
     if odd:
         least = min(of[name].explained for name in odd)
         warnings.append(
             f"{', '.join(odd)}: the wheel torques explain {100.0 * max(least, 0.0):.0f} % of the car's acceleration "
-            "(share of the variance). Expected the torque of all wheels, brakes included, in N m at the wheel: what is "
-            "missing of it is told as an effect."
+            "(share of the variance). Expected the torque of all wheels, brakes included, in N m at the wheel: "
+            "missing torque is named as an effect."
         )
     return problems, warnings
 
@@ -419,8 +420,8 @@ def _radii(motions: Sequence[Motion], car: Car) -> tuple[list[str], list[str]]:
             wheels = ", ".join(f"{w} {r:.3f}" for w, r in zip(WHEELS, radius, strict=True))
             texts.append(
                 f"{', '.join(off)}: the wheels roll with radii of {wheels} m (vehicle speed over wheel speed), the "
-                f"vehicle file says {car.radius_m:.3f} m: these logs are of another car, or the unit of a speed is "
-                "another one. Expected wheel_radius_m of the car that was driven, or a mapping with the unit."
+                f"vehicle file says {car.radius_m:.3f} m: these logs are of another car, or the unit of a speed "
+                "is wrong. Expected wheel_radius_m of the car that was driven, or a mapping with the unit."
             )
             break
     return problems, warnings
@@ -440,8 +441,8 @@ def _shared(sources: Sources) -> list[str]:
     if not names:
         return []
     return [
-        f"{held.log.name}: holds the same samples as {', '.join(names)}; expected a hold-out of another drive. What is "
-        "said of the hold-out holds for what the parameters were fitted to."
+        f"{held.log.name}: holds the same samples as {', '.join(names)}; expected a hold-out of another drive. "
+        "Its gap is not that of an independent drive."
     ]
 
 

@@ -164,8 +164,8 @@ def chosen(diagnosis: Diagnosis, effect: str | None = None) -> tuple[Cause, ...]
         return tuple(cause for cause in diagnosis.causes if cause.effect == effect)[:1]
     if diagnosis.verdict is Verdict.AMBIGUOUS:
         raise ScenarioError(
-            f"the verdict is ambiguous: the logs do not tell {' from '.join(known)}. Expected the one to put into "
-            f"the car: --effect {' or --effect '.join(known)}."
+            f"the verdict is ambiguous: the logs do not separate {' and '.join(known)}. Choose the effect to put "
+            f"into the car: --effect {' or --effect '.join(known)}."
         )
     return needed(diagnosis)
 

@@ -1,7 +1,4 @@
-"""What is judged beside the contest of the car's effects: the camera chain, and a pulse counter's lattice.
-
-They are seen in data that the other effects do not touch, and each brings its own verdict.
-"""
+"""Auxiliary verdicts, on data that the effects of the car's motion do not change: camera chain and pulse counter."""
 
 from __future__ import annotations
 
@@ -29,13 +26,13 @@ from sim2real.result import (
 )
 
 UNKNOWN_BELIEF = 0.05
-"""Share of the camera's effects in the belief where what they leave says that it is none of them, or not all [-]."""
+"""Probability of the camera's effects together if the gap is not explained by them [-]."""
 CERTAIN = 0.97
 """Probability of what a mark that nothing else leaves has shown [-]."""
 
 
 @dataclass(frozen=True)
-class Side:
+class AuxiliaryVerdict:
     """A verdict on data of its own.
 
     Attributes
@@ -43,7 +40,7 @@ class Side:
     verdict : Verdict
         Of these data alone.
     named : tuple of str
-        Effects that it stands by.
+        Effects that it names.
     causes : tuple of Cause
         Candidates with probabilities, best first.
     before, after : dict
@@ -69,8 +66,8 @@ class Side:
         alone = {(effect,) for effect in self.named}
         return self.verdict is Verdict.AMBIGUOUS and set(self.ambiguous_with) == alone
 
-    def put_off(self) -> Side:
-        """The side without its question, which is left as a warning."""
+    def put_off(self) -> AuxiliaryVerdict:
+        """The verdict without its question, which becomes a warning."""
         return replace(
             self,
             verdict=Verdict.NO_GAP,
@@ -84,14 +81,14 @@ class Side:
         )
 
 
-def camera_side(
+def camera_verdict(
     found: PerceptionFinding, vehicle: VehicleFile | None = None, road: RoadFile | None = None
-) -> Side:
-    """The camera chain's verdict as a side; for a car on a road with what to drive next."""
+) -> AuxiliaryVerdict:
+    """The camera chain's auxiliary verdict; with vehicle and road also the next manoeuvre."""
     alone = {c.effects[0]: c for c in found.candidates if len(c.effects) == 1}
     told: dict[str, CameraCandidate] = {}
-    blamed = [c for c in found.candidates if set(c.effects) == set(found.causes)]
-    for candidate in (*blamed, *alone.values(), *found.candidates):
+    named = [c for c in found.candidates if set(c.effects) == set(found.causes)]
+    for candidate in (*named, *alone.values(), *found.candidates):
         for effect in candidate.effects:
             told.setdefault(effect, candidate)
     share = _shares(found)
@@ -105,7 +102,7 @@ def camera_side(
         term = Unexplained(
             "camera", odd.signal, odd.depends_on, "-", odd.sign, odd.shape, np.nan, none, none, odd.sentence
         )
-    return Side(
+    return AuxiliaryVerdict(
         verdict=found.verdict,
         named=found.causes,
         causes=tuple(sorted(causes, key=lambda c: -c.probability)),
@@ -152,19 +149,20 @@ def _next(found: PerceptionFinding, vehicle: VehicleFile, road: RoadFile) -> Nex
 
 
 def _in_numbers(found: PerceptionFinding) -> str:
-    """What the causes do to the camera's gap, and at which values; empty where nothing is blamed."""
-    blamed = next((c for c in found.candidates if set(c.effects) == set(found.causes)), None)
-    if blamed is None:
+    """What the causes do to the camera's gap, and at which values; empty where nothing is named."""
+    named = next((c for c in found.candidates if set(c.effects) == set(found.causes)), None)
+    if named is None:
         return ""
     values = ", ".join(
         f"{name} {value.value:.3g} {value.unit}".removesuffix(" -")
-        for effect in blamed.effects
-        for name, value in _own(effect, blamed).items()
+        for effect in named.effects
+        for name, value in _own(effect, named).items()
     )
-    if not np.isfinite(blamed.after.total):
-        return f"with {values}; the hold-out does not tell how far the camera's gap shrinks."
+    if not np.isfinite(named.after.total):
+        return f"with {values}; the hold-out does not show by how much the camera's gap decreases."
     return (
-        f"with {values} the camera's gap goes from {found.before.total:.1f} to {found.after.total:.1f} times the noise "
+        f"with {values} the camera's gap decreases from {found.before.total:.1f} to {found.after.total:.1f} times "
+        "the noise "
         "floor."
     )
 
@@ -176,10 +174,10 @@ def _shares(found: PerceptionFinding) -> dict[str, float]:
     signals that stand by none, as too small to matter, are no likelier than that all is as simulated.
     """
     named = {*found.causes, *(effect for group in found.ambiguous_with for effect in group)}
-    telling = {c.signal for c in found.candidates if named.issuperset(c.effects)}
+    named_signals = {c.signal for c in found.candidates if named.issuperset(c.effects)}
     scores = np.array([0.0, *(c.score - DECISIVE * (len(c.effects) - 1) for c in found.candidates)])
-    idle = np.array([False, *(c.signal not in telling for c in found.candidates)])
-    if telling and idle.any():
+    idle = np.array([False, *(c.signal not in named_signals for c in found.candidates)])
+    if named_signals and idle.any():
         scores[idle] -= max(scores[idle].max(), 0.0)
     weight = np.exp(scores - scores.max())
     weight /= weight.sum()
@@ -216,7 +214,7 @@ def _within(estimate: Interval, parameter: Parameter) -> Interval:
     return Interval(float(value), float(low), float(high), estimate.unit)
 
 
-def counter_side(lattice: Lattice, before: Measure, after: Measure, excluded: bool) -> Side:
+def counter_verdict(lattice: Lattice, before: Measure, after: Measure, excluded: bool) -> AuxiliaryVerdict:
     """The verdict on wheel speeds that lie on a lattice.
 
     Parameters
@@ -235,7 +233,7 @@ def counter_side(lattice: Lattice, before: Measure, after: Measure, excluded: bo
             "wheel_speed_sensor", "wheel_speed", "value", "rad/s", "has no sign", "a staircase", 1.0,
             np.array([]), np.array([]), what,
         )  # fmt: skip
-        return Side(
+        return AuxiliaryVerdict(
             Verdict.UNKNOWN,
             (),
             (),
@@ -257,10 +255,10 @@ def counter_side(lattice: Lattice, before: Measure, after: Measure, excluded: bo
         fit_bic=float("-inf"),
         evidence_for=(
             what,
-            "A simulated counter scatters as much; where in a tooth it began cannot be known.",
+            "A simulated counter scatters as much; the phase of its first pulse is not known.",
         ),
     )
-    return Side(
+    return AuxiliaryVerdict(
         Verdict.IDENTIFIED,
         ("wheel_speed_quantisation",),
         (cause,),

@@ -12,7 +12,7 @@ import numpy as np
 from scenarios.effects import EFFECTS, form_of
 from scenarios.files import load_vehicle
 from sim2real.adequacy import require_adequate
-from sim2real.auxiliary import camera_side, counter_side
+from sim2real.auxiliary import camera_verdict, counter_verdict
 from sim2real.discrepancy.verdict import beside_another_build
 from sim2real.how_far.gap import measure
 from sim2real.how_far.trpac_error import trpac_error
@@ -81,7 +81,7 @@ def diagnose_files(
     by : "time" or "position"
         What says that rows of a log and of its reference are the same point of the manoeuvre.
     baseline : sequence of str
-        Logs of the same car without the suspected fault, of any manoeuvre: how it is built otherwise than simulated is
+        Logs of the same car without the fault, of any manoeuvre: how it is built otherwise than simulated is
         learnt from them, too.
     model, signals : Path, optional
         The user's own plant as a co-simulation unit, and the file that says which of its variables is which signal: its
@@ -148,7 +148,7 @@ def diagnose_sources(
         found=findings.added(),
     )
     if camera is not None:
-        said = merge(said, camera_side(camera, sources.vehicle, sources.holdout.road))
+        said = merge(said, camera_verdict(camera, sources.vehicle, sources.holdout.road))
     return replace(
         said,
         trpac=_estimate(findings, sources),
@@ -198,7 +198,7 @@ def _beside_own(said: Diagnosis) -> Diagnosis:
         return said
     group = tuple(dict.fromkeys((first.effect, effect, *(e for g in groups for e in g))))
     others = tuple(g for g in said.ambiguous_with if g not in groups)
-    told = f"So {effect} and {first.effect} are not told apart."
+    told = f"So {effect} and {first.effect} are not separated by these logs."
     return replace(
         said,
         verdict=Verdict.AMBIGUOUS,
@@ -236,7 +236,7 @@ def _told(
     said = describe(findings, seed=seed, jobs=jobs, progress=progress)
     if findings.lattice is None:
         return said
-    return merge(said, counter_side(findings.lattice, *counter_gap(findings), COUNTER in exclude))
+    return merge(said, counter_verdict(findings.lattice, *counter_gap(findings), COUNTER in exclude))
 
 
 def find(
@@ -249,7 +249,7 @@ def find(
     jobs: int = 1,
     progress: Progress = silent,
 ) -> Findings:
-    """Hold the contest and decide it; `baseline` are drives of the same car without the suspected fault."""
+    """Hold the contest and decide it; `baseline` are drives of the same car without the fault."""
     lattice = None if model.has(COUNTER) else common_lattice([d.lattice for d in (*fit, holdout)])
     base = model.with_effects(lattice.effect()) if lattice else model
     order, (*fit, holdout) = without_order(base, [*fit, holdout])

@@ -1,4 +1,4 @@
-"""What to drive next: the profile on which two effects that look alike differ most, with its predicted power."""
+"""The next manoeuvre: the profile on which two effects differ most, with the predicted distance."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Profile:
 
 STEADY_SPEEDS = Profile(
     "steady speeds",
-    "Hold 8 m/s, then after three seconds at full torque the speed that this gives, four seconds each.",
+    "Hold 8 m/s for four seconds, drive three seconds at full torque, then hold the speed for four seconds.",
     8.0,
     (0, 4, 4.5, 7.5, 8, 12),
     (0.05, 0.05, 1, 1, 0.08, 0.08),
@@ -54,7 +54,8 @@ STEADY_SPEEDS = Profile(
 
 BRAKING = Profile(
     "brake to the limit",
-    "From 18 m/s press the brake slowly until the wheels are about to lock, let go, and again from what speed is left.",
+    "From 18 m/s increase the brake force slowly until the wheels are about to lock, release, and repeat at the "
+    "remaining speed.",
     18.0,
     (0, 1, 2, 2.2, 5.5, 5.7, 7, 7.2, 10, 10.2, 12),
     (0.5, 0.5, 0, -0.2, -1.0, 0, 0.8, -0.2, -1.0, 0, 0),
@@ -73,7 +74,7 @@ PROFILES = (
     ),
     Profile(
         "tip-in and tip-out",
-        "At 10 m/s step the pedal in and out, once a second.",
+        "At 10 m/s step the accelerator on and off, once per second.",
         10.0,
         tuple(float(t) for k in range(12) for t in (k, k + 0.03, k + 0.5, k + 0.53)),
         (-0.1, 0.8, 0.8, -0.1) * 12,
@@ -142,16 +143,14 @@ def propose(
     power, profile, time_s, torque = best
     names = (a.name, b.name)
     verdict = (
-        f"It would leave {power:.0f} standard deviations between {names[0]} and {names[1]}"
+        f"The predicted distance between {names[0]} and {names[1]} is {power:.0f} standard deviations"
         if power >= SEPARATE_SIGMA
-        else f"Even so only {power:.1f} standard deviations would lie between {names[0]} and {names[1]}"
+        else f"The predicted distance between {names[0]} and {names[1]} is only {power:.1f} standard deviations"
     )
-    at_hand = f"the logs at hand have {now_sigma:.1f}"
+    at_hand = f"in the present logs it is {now_sigma:.1f}"
     if now_sigma >= power:
         better = min((a, b), key=lambda entry: entry.loss).name
-        at_hand += (
-            f", in favour of {better}, which may be no more than how simulation and car differ in all else"
-        )
+        at_hand += f", in favour of {better}, which may come from other model differences"
     return NextManoeuvre(
         f"{profile.sentence} {verdict}; {at_hand}.",
         profile.initial_speed_m_s,

@@ -27,12 +27,13 @@ class Verdict(StrEnum):
 
 
 MEANING = {
-    Verdict.IDENTIFIED: "One effect explains the gap down to the noise, and no other does as well.",
-    Verdict.PARTIAL: "One effect explains a part of the gap; the rest is a difference between the models.",
-    Verdict.AMBIGUOUS: "The data cannot tell some effects apart; the next manoeuvre would.",
+    Verdict.IDENTIFIED: "One effect explains the gap down to the noise, and no other effect does.",
+    Verdict.PARTIAL: "One effect explains a part of the gap; the rest is a model difference that no effect "
+    "describes.",
+    Verdict.AMBIGUOUS: "Several effects explain these logs equally well; the next manoeuvre would separate them.",
     Verdict.COMPOUND: "Two or more effects are needed together.",
     Verdict.UNKNOWN: "There is a gap, and no effect of the library explains it.",
-    Verdict.NO_GAP: "What is left between simulation and log is sensor noise; nothing may be blamed.",
+    Verdict.NO_GAP: "The difference between simulation and log is sensor noise.",
 }
 
 
@@ -94,7 +95,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Cause:
-    """One candidate (an effect, or the pair of a compound) and what speaks for it.
+    """One candidate (an effect, or the pair of a compound) with its evidence.
 
     Attributes
     ----------
@@ -322,12 +323,12 @@ class Diagnosis:
     unexplained: Unexplained | None = None
     """What is left where no effect explains the gap (`unknown`), or beside the effect (`partial`)."""
     build: dict[str, float] = field(default_factory=dict)
-    """How the car's build differs from the simulated one beside the effect: change to its size."""
+    """Differences of the car's build beside the effect: change to its size, see docs/theory/diagnosis.md."""
     budget: Budget | None = None
     """None where there is no gap to share out."""
     trpac: RmsError | None = None
     own_model: OwnFinding | None = None
-    """None where the nominal model stands for itself."""
+    """None without a model of the user."""
     rating: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
     """ISO/TS 18571 rating per signal, before and after; None where it is not defined."""
     traces: tuple[Trace, ...] = ()
@@ -368,7 +369,7 @@ class Diagnosis:
 
 def at_bound_in_words(name: str) -> str:
     """What is said against an estimate that lies at its bound."""
-    return f"{name} lies at its bound: more of it is not thought plausible, so look for another cause."
+    return f"{name} lies at its bound: larger values are not plausible, so look for another cause."
 
 
 def needed(diagnosis: Diagnosis) -> tuple[Cause, ...]:

@@ -92,7 +92,7 @@ class Sources:
     fit: tuple[Source, ...]
     holdout: Source
     baseline: tuple[Source, ...] = ()
-    """Logs of the same car without the suspected fault, of any manoeuvre."""
+    """Logs of the same car without the fault, of any manoeuvre."""
 
     @property
     def all(self) -> tuple[Source, ...]:
@@ -166,7 +166,7 @@ def read_sources(
     pairing : Pairing, optional
         Reference logs; on the road of their log where they name none.
     baseline : sequence of str
-        Logs of the same car without the suspected fault.
+        Logs of the same car without the fault.
     dbc : sequence of Path
         DBC files that say what the frames of a bus mean.
 
@@ -226,7 +226,7 @@ def put_together(
         named = [paired_with(s, r, model, by) for s, r in zip(named, references, strict=True)]
     *fitted, held = (with_turns_told(source, car) for source in named)
     if any(s.log.sha256 == held.log.sha256 and _overlap(s.log, held.log) for s in fitted):
-        told = "is a fit log, too: what is said of the hold-out holds for what the parameters were fitted to."
+        told = "is a fit log, too: its gap is not that of an independent drive, since parameters were fitted to it."
         held = replace(held, log=held.log.warned(told))
     return Sources(car, vehicle_path, tuple(fitted), held)
 
@@ -247,8 +247,8 @@ def paired_with(source: Source, reference: Source, model: Simulation, by: By = "
     if apart <= OTHER_TORQUE:
         return found
     told = (
-        f"the torque of {reference.log.name} differs by {100.0 * apart:.0f} % of this log's (root mean square): what "
-        "both have in common cancels only where they were driven alike. Match by position, or drive it again."
+        f"the torque of {reference.log.name} differs by {100.0 * apart:.0f} % of this log's (root mean square): "
+        "the common model error cancels only if both drives are alike. Match by position, or repeat the drive."
     )
     return replace(found, log=found.log.warned(told))
 
@@ -280,8 +280,8 @@ def with_turns_told(source: Source, vehicle: VehicleFile) -> Source:
     if turning_s < LEAST_TURNING_S:
         return source
     told = (
-        f"the car turns in {turning_s:.0f} s of it; the model drives straight on, so a curve is told as anything else, "
-        "as wheel sensors of one side. Leave such stretches out where they are many."
+        f"the car turns in {turning_s:.0f} s of it; the model drives straight, so a curve can appear as another "
+        "fault, such as one of the left or right wheel sensors. Leave such stretches out if they are long."
     )
     return replace(source, log=log.warned(told))
 
@@ -341,22 +341,23 @@ def make_source(log: Log, road: RoadFile, road_path: Path | None = None) -> Sour
     told_s = float(drive.time_s[-1] - drive.time_s[0])
     if told_s < MIN_DURATION_S:
         raise ScenarioError(
-            f"{log.path}: tells how fast the car is in its last {told_s:.3g} s alone; expected at least "
+            f"{log.path}: has the speed of the car in its last {told_s:.3g} s only; expected at least "
             f"{MIN_DURATION_S:g} s."
         )
     asleep_s = float(drive.time_s[0] - whole.time_s[0])
     if asleep_s > 0.0:
-        left_out = f"the first {asleep_s:.3g} s are left out: nothing tells yet how fast the car is."
+        left_out = f"the first {asleep_s:.3g} s are left out: the speed of the car is not measured there."
         log = log.warned(left_out)
     untold_s = _untold_s(*grid)
     if untold_s > 0.0:
         log = log.warned(
-            f"{untold_s:.3g} s are left out: a wheel's torque is lost there for long, or just was."
+            f"{untold_s:.3g} s are left out: the torque of a wheel is missing there or shortly before."
         )
     back_s = float(backward(drive.time_s, drive.measured[:, WHEEL]).sum() * drive.step_s)
     if back_s > 0.0:
-        left_out = f"{back_s:.3g} s are left out: a wheel turns back, or has just done so, which the plant's never do."
-        log = log.warned(left_out)
+        log = log.warned(
+            f"{back_s:.3g} s are left out: a wheel turns backwards there or shortly before, which the model's never do."
+        )
     return Source(log, road, road_path, drive)
 
 

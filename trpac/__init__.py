@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from trpac.files import list_effects, list_roads, list_scenarios, list_vehicles, read_log
     from trpac.gap import Diagnosis, diagnose
     from trpac.scenarios import ScenarioRun, run, simulate
-    from trpac.units import build_fmu
+    from trpac.units import build_fmu, build_ssp
 
 _MODULES = {
     "scenarios.car_and_road": ("Road", "Vehicle"),
@@ -40,7 +40,7 @@ _MODULES = {
     "trpac.files": ("list_effects", "list_roads", "list_scenarios", "list_vehicles", "read_log"),
     "trpac.gap": ("Diagnosis", "diagnose"),
     "trpac.scenarios": ("ScenarioRun", "run", "simulate"),
-    "trpac.units": ("build_fmu",),
+    "trpac.units": ("build_fmu", "build_ssp"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 
@@ -59,6 +59,7 @@ __all__ = [
     "Vehicle",
     "VisionEstimator",
     "build_fmu",
+    "build_ssp",
     "classify",
     "diagnose",
     "effects",

@@ -14,7 +14,6 @@ from scenarios.files import SensorNoise
 from scenarios.library import located
 from scenarios.progress import Progress, silent
 from scenarios.whole_files import written_whole
-from trpac.effects import TorqueLag
 from trpac.scenarios import simulate
 
 CAR, ROAD, CAMERA = "four_in_wheel_motor_ev", "paper_simulation", "paper"
@@ -78,10 +77,10 @@ def example(folder: str | Path, progress: Progress = silent) -> tuple[Path, ...]
         drive.to_csv(made / "drive.csv", index=False)
         _foreign(drive).to_csv(made / "foreign.csv", index=False)
         (made / "mapping.yaml").write_text(_mapping(), encoding="utf-8")
-        lag = [TorqueLag(time_constant_s=LAG_S)]
+        real = car.with_effects({"torque_lag": {"time_constant_s": LAG_S}})
         for seed, (name, share) in enumerate((("fit_a", 0.8), ("fit_b", 0.9), ("holdout", 1.0)), start=2):
             torque = pedal(time_s[:800], share)
-            log = simulate(car, road, torque=torque, effects=lag, noise=NOISE, seed=seed)
+            log = simulate(real, road, torque=torque, noise=NOISE, seed=seed)
             log.to_csv(made / f"{name}.csv", index=False)
         files = sorted(path.name for path in made.iterdir())
     with written_whole(folder / "frames") as made:

@@ -130,23 +130,24 @@ def diagnose(
     vehicle, road : Vehicle and Road, or path or name of each
         Car and road of the simulation.
     fit, holdout : sequence of logs, log
-        DataFrames or paths: logs for the fit of parameters, and the log on which the gap is measured.
+        Paths, DataFrames or Logs: the logs to which parameters are fitted, and the one on which the gap is measured.
+        Windows of one log (`read_log(path).window(from_s, to_s)`) may be used for both.
     mapping : path, optional
         Columns of the logs in the log format.
     dbc : path or sequence of paths, optional
-        DBC files that say what the frames of a bus mean.
+        DBC files with the meaning of bus frames.
     baseline : sequence of logs
-        Logs of the same car without the suspected fault, of any manoeuvre.
+        Logs of the same car without the fault, of any manoeuvre.
     paired : sequence of logs
-        The same manoeuvres without the fault, one for each fit log and, last, the hold-out's: what the simulation
-        leaves of them is no gap.
+        The same manoeuvres without the fault, one for each fit log and, last, the hold-out's. The model error that a
+        log has in common with its pair does not count as gap.
     simulated : sequence of logs
         Logs of your own simulation over each log's inputs, in place of `paired`.
     by : "time" or "position"
-        Equal `time_s` or equal `position_m` are the same point of the manoeuvre in a log and its reference.
+        The quantity by which the rows of a log and its reference are matched.
     model, signals : path, optional
-        Your own plant as a co-simulation unit, and the file that says which of its variables is which signal, in place
-        of `simulated`.
+        Your own vehicle model as a co-simulation FMU, and the file with its variables and signals, in place of
+        `simulated`.
     seed : int
         Seed of the resampling for the intervals.
     exclude : collection of str
@@ -154,7 +155,7 @@ def diagnose(
     jobs : int
         Number of threads.
     progress : callable
-        Called with the stage, and how many of how many of its items are done.
+        Called with the stage, the number of finished items and the number of all.
 
     Raises
     ------

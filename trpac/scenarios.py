@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -23,6 +23,9 @@ from trpac.picture import Picture
 from trpac_core.errors import TrpacError
 from trpac_core.estimator_data import Method
 from trpac_core.vehicle import WHEELS
+
+if TYPE_CHECKING:
+    from scenarios.brake_onset import Comparison
 
 
 def simulate(
@@ -90,6 +93,7 @@ class ScenarioRun:
     summary: dict[str, Any]
     _run: Any
     _scratch: tempfile.TemporaryDirectory[str]
+    _comparisons: tuple[Comparison, ...] = ()
 
     @property
     def frames(self) -> tuple[Path, ...]:
@@ -108,6 +112,11 @@ class ScenarioRun:
         return pd.DataFrame(rows).to_html(index=False)
 
     @property
+    def brake_onsets(self) -> tuple[str, ...]:
+        """The result of each scenario of `compare_camera` in words."""
+        return tuple(comparison.onset.sentence for comparison in self._comparisons)
+
+    @property
     def verdict(self) -> str:
         """Results of the run in sentences, one per stretch of road."""
         from scenarios.report import verdict
@@ -123,7 +132,11 @@ class ScenarioRun:
         return Picture(path.read_bytes())
 
     def write(self, folder: str | Path, progress: StageProgress = silent) -> tuple[Path, ...]:
-        """Write report.html, figure17.png, log.csv and summary.json; returns their paths."""
+        """Write report.html, figure17.png, log.csv and summary.json; returns their paths.
+
+        With `compare_camera` also brake_onset.png, which is the report's first picture.
+        """
+        from scenarios.brake_onset_figure import draw_brake_onset
         from scenarios.report import write_report
         from scenarios.runner import write_run
         from scenarios.vision_overlay import draw_overlay_sheet
@@ -137,7 +150,12 @@ class ScenarioRun:
                     self._run, overlay, lambda done, total: progress("drawing the report", done, total)
                 )
             self.figure17().save(made / "figure17.png")
-            write_report(self._run, overlay, made / "report.html")
+            onset_figure = None
+            if self._comparisons:
+                onset_figure = made / "brake_onset.png"
+                draw_brake_onset(self._comparisons, onset_figure)
+            report = made / "report.html"
+            write_report(self._run, overlay, report, self._comparisons, onset_figure)
             write_run(self._run, made)
             names = sorted(path.name for path in made.iterdir())
         return tuple(Path(folder) / name for name in names)
@@ -151,6 +169,7 @@ def run(
     fmu: str | Path | None = None,
     kind: str = "python",
     method: str = "robust",
+    compare_camera: Sequence[str | Path] = (),
     progress: StageProgress = silent,
 ) -> ScenarioRun:
     """Results of a scenario: plant, rendered and disturbed pictures, the unit under fmpy, scores.
@@ -160,13 +179,17 @@ def run(
     scenario : path or name
         Scenario file, or a shipped one such as "paper_simulation".
     seed, stiffness_n : optional
-        Replace the scenario's seed, and the vehicle's C_x [N].
+        Replace the seed and the vehicle's C_x of all scenarios [N].
     fmu : path, optional
         The unit; by default one is built.
     kind : str
         Kind of the unit that is built: python or native (docs/guide/unit/native.md).
     method : str
         Estimator of the unit: as_printed, dife or robust (docs/theory/methods.md).
+    compare_camera : sequence of paths or names
+        Scenarios that brake after the road's last border, such as "cruise_onto_snow". Each is run with and without its
+        camera; what TRPAC is when the brakes are applied, and the stopping distance planned from it, is added to the
+        report and, as `brake_onset`, to the summary.
     progress : callable
         Called with the stage, and how many of how many of its items are done.
 
@@ -178,21 +201,37 @@ def run(
         Without the extra 'fmu'.
     """
     which = Method.of(method)
-    chosen = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    chosen, *compared = (_with_changes(given, seed, stiffness_n) for given in (scenario, *compare_camera))
+    scratch = tempfile.TemporaryDirectory(prefix="trpac_")
+    folder = Path(scratch.name)
+    with extras("run", "fmu"):
+        from fmu_src.kinds import build
+        from scenarios.brake_onset import compare, require_comparable
+        from scenarios.fmu_client.estimator import UNIT
+        from scenarios.runner import run_scenario
+        from trpac.units import require_unit
+
+        for each in compared:
+            require_comparable(each)
+        unit = require_unit(fmu) if fmu is not None else build(UNIT, folder, kind=kind, everywhere=False)
+        finished = run_scenario(chosen, unit, folder / "frames", progress, method=which)
+        comparisons = tuple(
+            compare(each, unit, folder / f"frames_{number}", progress, which)
+            for number, each in enumerate(compared)
+        )
+    if comparisons:
+        onsets = [comparison.onset.summary() for comparison in comparisons]
+        finished = replace(finished, summary=finished.summary | {"brake_onset": onsets})
+    return ScenarioRun(finished.table, finished.summary, finished, scratch, comparisons)
+
+
+def _with_changes(given: Scenario | str | Path, seed: int | None, stiffness_n: float | None) -> Scenario:
+    """A scenario with another seed and C_x, where they are given."""
+    chosen = given if isinstance(given, Scenario) else load_scenario(given)
     if seed is not None:
         chosen = replace(chosen, seed=seed)
     if stiffness_n is not None:
         car = chosen.vehicle.model_dump(by_alias=True)
         car["tyre"]["longitudinal_stiffness_n"] = stiffness_n
         chosen = replace(chosen, vehicle=Vehicle(**car))
-    scratch = tempfile.TemporaryDirectory(prefix="trpac_")
-    folder = Path(scratch.name)
-    with extras("run", "fmu"):
-        from fmu_src.kinds import build
-        from scenarios.fmu_client.estimator import UNIT
-        from scenarios.runner import run_scenario
-        from trpac.units import require_unit
-
-        unit = require_unit(fmu) if fmu is not None else build(UNIT, folder, kind=kind, everywhere=False)
-        finished = run_scenario(chosen, unit, folder / "frames", progress, method=which)
-    return ScenarioRun(finished.table, finished.summary, finished, scratch)
+    return chosen

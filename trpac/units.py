@@ -15,6 +15,7 @@ def build_fmu(
     kind: str = "python",
     fmi: int = 2,
     flat: bool = False,
+    networks: str | Path | None = None,
 ) -> Path:
     """Build a co-simulation unit and validate it; returns its path.
 
@@ -31,6 +32,8 @@ def build_fmu(
         Version of FMI: 2 for 2.0; of a native unit also 3 for 3.0.
     flat : bool
         Whether the names of its variables are without dots.
+    networks : path, optional
+        Folder with segmenter.onnx and surface.onnx for an estimator of kind python; by default those of the package.
 
     Raises
     ------
@@ -44,10 +47,48 @@ def build_fmu(
 
         from fmu_src.kinds import build
 
-        path = build(unit, Path(folder), kind=kind, fmi=fmi, flat=flat)
+        own = None if networks is None else _checked_networks(Path(networks))
+        path = build(unit, Path(folder), kind=kind, fmi=fmi, flat=flat, networks=own)
         if problems := validate_fmu(str(path)):
             raise TrpacError("\n".join(f"{path}: {problem}" for problem in problems))
     return path
+
+
+def build_ssp(folder: str | Path, *, system: str = "four_wheels", kind: str = "python") -> Path:
+    """Build a package (SSP 1.0) of driver, plant and estimator and validate it; returns its path.
+
+    Parameters
+    ----------
+    folder : path
+        Folder of the package, which is made where it is missing.
+    system : str
+        four_wheels, with TrpacEstimator4W, or one_wheel, with TrpacEstimator at the front left wheel.
+    kind : str
+        Kind of the estimator, as of `build_fmu`. Driver and plant are of kind python.
+
+    Raises
+    ------
+    TrpacError
+        There is no such system or kind, or it cannot be built.
+    MissingExtraError
+        Without the extra 'fmu'.
+    """
+    with extras("build_ssp", "fmu"):
+        from fmu_src.ssp import build_system
+        from fmu_src.ssp_client import problems
+
+        path = build_system(system, folder, kind)
+        if found := problems(path):
+            raise TrpacError("\n".join(f"{path}: {problem}" for problem in found))
+    return path
+
+
+def _checked_networks(folder: Path) -> Path:
+    """A folder of networks that can be loaded; raises TrpacError."""
+    from scenarios.stills import StillNetworks
+
+    StillNetworks.load(folder)
+    return folder
 
 
 def require_unit(path: str | Path) -> Path:

@@ -35,30 +35,31 @@ COLOURS = {
 
 
 class By(StrEnum):
-    """What says that rows of two logs are the same point of the manoeuvre."""
+    """The quantity by which rows of two logs are matched."""
 
     TIME = "time"
     POSITION = "position"
 
 
 app = typer.Typer(
-    help="The sim-to-real gap: where it lies, which effect causes it, how far it shrinks.",
+    help="Diagnosis of the sim-to-real gap: location, cause, remaining gap.",
     no_args_is_help=True,
 )
 
 
 @app.command()
 def diagnose(
-    vehicle: Annotated[Path, typer.Option(help="What the simulation knows of the car: vehicle.yaml.")],
+    vehicle: Annotated[Path, typer.Option(help="The simulated car: vehicle.yaml.")],
     fit: Annotated[
         list[str],
         typer.Option(
-            help="Log to fit to (table, MDF, MAT-file, bus log), LOG or LOG@ROAD.yaml; may be repeated."
+            help="Log to fit to (table, MDF, MAT-file, bus log): LOG, LOG@ROAD.yaml, LOG@FROM:TO in seconds, or "
+            "LOG@ROAD.yaml@FROM:TO; may be repeated."
         ),
     ],
     holdout: Annotated[
         str,
-        typer.Option(help="Log that the gap is measured on, and nothing is fitted to; LOG or LOG@ROAD.yaml."),
+        typer.Option(help="Log on which the gap is measured; nothing is fitted to it. As --fit."),
     ],
     out: Annotated[Path, typer.Option(help="Folder for diagnosis.json and report.html.")],
     road: Annotated[
@@ -66,7 +67,7 @@ def diagnose(
     ] = None,
     mapping: Annotated[
         Path | None,
-        typer.Option("--map", help="How the logs' columns and units become the contract's: mapping.yaml."),
+        typer.Option("--map", help="Names and units of the logs' columns: mapping.yaml."),
     ] = None,
     dbc: Annotated[
         list[Path] | None,
@@ -74,7 +75,7 @@ def diagnose(
     ] = None,
     baseline: Annotated[
         list[str] | None,
-        typer.Option(help="Log of the same car without the suspected fault, any manoeuvre; may be repeated."),
+        typer.Option(help="Log of the same car without the fault, any manoeuvre; may be repeated."),
     ] = None,
     paired: Annotated[
         list[str] | None,
@@ -98,7 +99,7 @@ def diagnose(
     model: Annotated[
         Path | None,
         typer.Option(
-            help="Your own plant as an FMU for co-simulation: it is run over the logs, in place of --simulated."
+            help="Your own vehicle model as an FMU for co-simulation: it is run over the logs, in place of --simulated."
         ),
     ] = None,
     signals: Annotated[
@@ -106,36 +107,40 @@ def diagnose(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same diagnosis.")] = 0,
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Fits at a time; without it one per processor.")
+        int | None, typer.Option(min=1, help="Parallel fits; default: one per processor.")
     ] = None,
 ) -> None:
     """Diagnose the gap between a simulation and recorded logs.
 
     Runs the simulated car along the logs, fits every effect of the
-    library to the fit logs and compares them on the hold-out. Says where the
-    gap lies, which effect causes it, how far it shrinks with that, and what
-    to drive next where the logs cannot tell.
+    library to the fit logs and compares the fits on the hold-out. Reports
+    where the gap lies, which effect causes it, how much of it disappears
+    with that effect, and what to drive next if the logs do not separate
+    several effects. Guide: docs/guide/gap.md.
 
     Example: trpac gap diagnose --vehicle car.yaml --road track.yaml
     --fit monday.csv --fit tuesday.mf4 --holdout friday.csv@wet_track.yaml
     --map mapping.yaml --out out/gap
 
-    A mapping file names columns and units that are not the log format's:
-    schema: 1, and under columns: lines such as
-    vehicle_speed_m_s: {column: VehSpd, unit: km/h}. Ready-made ones lie in
-    sim2real/mappings, all that they can say is in docs/guide/logs.md.
+    With one log only, fit to some windows of it and hold another one out:
+    --fit drive.csv@0:6 --fit drive.csv@10: --holdout drive.csv@6:10
 
-    A car that is built otherwise than the simulated one leaves a gap without
-    any fault. --baseline before.csv, any drive before the fault, tells how
-    it is built. A second log of the same manoeuvre, recorded before the fault,
-    takes it off:
+    A mapping file translates other column names and units: schema: 1, and
+    under columns: lines such as vehicle_speed_m_s: {column: VehSpd, unit: km/h}.
+    Examples are in sim2real/mappings; docs/guide/logs.md has all options.
+
+    A car that differs from the simulated one leaves a gap without any
+    fault. --baseline before.csv, any drive before the fault, shows how it
+    differs. A second log of the same manoeuvre, recorded before the fault,
+    cancels the difference:
     --fit after_1.csv --holdout after_2.csv --paired before_1.csv
     --paired before_2.csv. So does your own simulation of the same drive:
-    --simulated sim_1.csv --simulated sim_2.csv. The logs' time_s has to
-    count from the same point; where it does not, --by position.
+    --simulated sim_1.csv --simulated sim_2.csv. The logs' time_s must
+    start at the same point; otherwise use --by position.
 
-    Your own plant as an FMU does the same, is tuned, and needs a file of
-    signals, such as this one; docs/guide/gap_own_model.md has all of it:
+    Your own vehicle model as an FMU does the same, and its parameters are
+    fitted. It needs a file of signals, such as this one; docs/guide/gap_own_model.md
+    describes it:
     schema: 1; inputs: {motor.fl: {signal: wheel_torque_fl_nm}, ...};
     outputs: {vehicle_speed_m_s: {column: v, unit: km/h}, ...};
     initial: {v0: {signal: vehicle_speed_m_s}};
@@ -143,9 +148,9 @@ def diagnose(
     effect: mass_offset.mass_kg}}.
     Then: --model plant.fmu --signals signals.yaml
 
-    No logs at hand? trpac gap demo --out out/gap_demo makes some.
+    No logs yet? trpac gap demo --out out/gap_demo makes some.
 
-    Exit codes: 0 with a diagnosis, 2 unusable input.
+    Exit codes: 0 with a diagnosis, whatever its verdict; 2 unusable input.
     """
     from joblib import cpu_count
 
@@ -190,16 +195,16 @@ def diagnose(
 def apply(
     diagnosis: Annotated[Path, typer.Argument(help="The diagnosis.json of trpac gap diagnose.")],
     vehicle: Annotated[Path, typer.Option(help="The vehicle.yaml that the diagnosis was made with.")],
-    out: Annotated[Path, typer.Option(help="Vehicle file to write, with what was found.")],
+    out: Annotated[Path, typer.Option(help="Vehicle file to write, with the effects.")],
     effect: Annotated[
         str | None,
-        typer.Option(metavar="ID", help="The effect to put in, where the verdict is ambiguous."),
+        typer.Option(metavar="ID", help="The effect to put in if the verdict is ambiguous."),
     ] = None,
 ) -> None:
-    """Put what a diagnosis found into the car: a vehicle.yaml that is ready to simulate.
+    """Write a vehicle.yaml with the effects that a diagnosis found.
 
-    Effects take the place of those of the same name in the file; all else
-    stays, comments are lost. The old file is not changed.
+    Effects replace those of the same name in the file. Everything else stays
+    except comments. The old file is not changed.
 
     Example: trpac gap apply out/gap/diagnosis.json --vehicle car.yaml
     --out car_with_effect.yaml
@@ -222,7 +227,7 @@ def apply(
 
 
 def _applied(diagnosis: Diagnosis, causes: tuple[Cause, ...], out: Path) -> Iterator[str]:
-    """Lines on what was put into the car, the gap that is left, and how to go on."""
+    """Lines on the effects in the car, the remaining gap, and the next step."""
     from scenarios.effects import EFFECTS
     from sim2real.apply import gap_left
 
@@ -238,17 +243,17 @@ def _applied(diagnosis: Diagnosis, causes: tuple[Cause, ...], out: Path) -> Iter
     budget = diagnosis.budget.shares if diagnosis.budget else {}
     if "structure" in budget and diagnosis.verdict == "partial":
         yield (
-            f"{100.0 * budget['structure'].value:.0f} % of the squared gap is a difference between the models and no "
-            "fault: it is not put in."
+            f"{100.0 * budget['structure'].value:.0f} % of the squared gap is a model difference that no effect "
+            "describes; it remains."
         )
     for cause in causes:
         if EFFECTS[cause.effect].stage == "perception":
             yield (
-                f"{cause.effect} acts in the camera chain: a diagnosis takes it from the vehicle file, the simulated "
-                "motion does not change, and trpac run renders pictures as its scenario says."
+                f"{cause.effect} acts in the camera chain: a diagnosis takes it from the vehicle file; the simulated "
+                "motion does not change, and trpac run renders pictures by its scenario."
             )
     if not (diagnosis.provenance.get("vehicle") or {}).get("sha256"):
-        yield "The diagnosis does not say which vehicle file it was made with: that was not checked."
+        yield "The diagnosis does not name its vehicle file, so the file was not checked."
     yield (
         f"Simulate: `vehicle: {out}` in a scenario and trpac run SCENARIO.yaml --out DIR, or trpac.simulate in Python. "
         f"What is left: trpac gap diagnose --vehicle {out} with the same logs."
@@ -258,13 +263,13 @@ def _applied(diagnosis: Diagnosis, causes: tuple[Cause, ...], out: Path) -> Iter
 
 @app.command()
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder for the case, its sealed truth and the report.")],
+    out: Annotated[Path, typer.Option(help="Folder for the case, its sealed solution and the report.")],
     seed: Annotated[int, typer.Option(min=0, help="Draws the hidden effect, road, drives and noise.")] = 1,
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Fits at a time; without it one per processor.")
+        int | None, typer.Option(min=1, help="Parallel fits; default: one per processor.")
     ] = None,
 ) -> None:
-    """See a diagnosis at work: hide an effect, diagnose the logs, open the seal.
+    """Demonstrate a diagnosis: hide an effect, diagnose the logs, show what was hidden.
 
     The effect is drawn from: accelerometer_bias, brake_drag,
     friction_offset, mass_offset, road_grade, torque_delay, torque_gain,
@@ -299,12 +304,12 @@ def demo(
                 progress=progress,
             )
             _, report = write_diagnosis(rated(diagnosis), out)
-        _print_step(console, "\n4. What it says.", "A gap of 1 is what the sensors' noise alone leaves.")
+        _print_step(console, "\n4. Result.", "A gap of 1 is sensor noise alone.")
         _summarise(console, diagnosis)
         _print_truth(console, case, open_seal(case), diagnosis)
     except (ScenarioError, OSError) as error:
         refuse(command, error)
-    console.print(f"The whole story, with pictures: {report}", soft_wrap=True)
+    console.print(f"Report: {report}", soft_wrap=True)
 
 
 def _print_step(console: Terminal, step: str, *sentences: str) -> None:
@@ -316,10 +321,10 @@ def _print_case(console: Terminal, case: Case) -> None:
     """Print what is hidden and what the diagnosis gets."""
     _print_step(
         console,
-        "1. Hiding something.",
-        "One effect is drawn, with a strength, and built into a car. The simulation of that car knows nothing of it.",
-        "The car is driven three times over a road of dry, wet and icy stretches: accelerating, coasting, braking up",
-        "to the grip limit. Its sensors are noisy.",
+        "1. The hidden effect.",
+        "One effect and its size are drawn at random and built into a car. The simulation of that car does not",
+        "contain it. The car is driven three times over a road of dry, wet and icy stretches: accelerating, coasting,",
+        "braking up to the friction limit. Its sensors are noisy.",
     )
     _print_step(
         console,
@@ -331,8 +336,8 @@ def _print_case(console: Terminal, case: Case) -> None:
     _print_step(
         console,
         "3. The diagnosis",
-        "lets the simulation run beside each log. What it mispredicts beyond the sensors' noise is the gap. Every",
-        "effect of the library is tried: how much of the gap does it explain, on the hold-out too?",
+        "runs the simulation along each log. Prediction errors beyond the sensor noise are the gap. Every effect of",
+        "the library is fitted: how much of the gap does it explain, also on the hold-out?",
     )
 
 
@@ -364,13 +369,13 @@ def judge(hidden: str, diagnosis: Diagnosis) -> str:
 
     ranked = [c.effect for c in diagnosis.causes]
     if hidden not in ranked:
-        return "The diagnosis did [red]not[/red] try it."
+        return "The diagnosis did [red]not[/red] fit it."
     rank = ranked.index(hidden) + 1
     probability = diagnosis.causes[rank - 1].probability
     if rank == 1 and diagnosis.verdict in ("identified", "partial"):
         return f"The diagnosis is [green]right[/green], with a probability of {percent(probability)}."
     if any(hidden in group for group in diagnosis.ambiguous_with):
-        return "The diagnosis has it among those that it [yellow]cannot tell apart[/yellow]."
+        return "The diagnosis has it among the effects that it [yellow]cannot separate[/yellow]."
     return (
         f"The diagnosis is [red]not right[/red]: it says '{diagnosis.verdict}' and ranks the hidden effect {rank} of "
         f"{len(ranked)}, with a probability of {percent(probability)}."
@@ -400,7 +405,7 @@ def _summarise(console: Terminal, diagnosis: Diagnosis) -> None:
     if leading(diagnosis):
         console.print(_cause_table(diagnosis))
     if diagnosis.next_manoeuvre is not None:
-        console.print(f"To tell them apart: {diagnosis.next_manoeuvre.sentence}")
+        console.print(f"To separate them: {diagnosis.next_manoeuvre.sentence}")
     for warning in diagnosis.warnings:
         console.print(warning, style="yellow")
 
@@ -423,12 +428,12 @@ def _cause_table(diagnosis: Diagnosis) -> Table:
     from scenarios.html_page import number, percent
     from sim2real.reporting.report import estimate
 
-    table = Table(title="Causes, likeliest first", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    table = Table(title="Causes, most probable first", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     table.add_column("effect", no_wrap=True)
     table.add_column("prob.", justify="right", no_wrap=True)
     table.add_column("estimate (95 % interval)")
     table.add_column("gap", justify="right", no_wrap=True)
-    table.add_column("shrink", justify="right", no_wrap=True)
+    table.add_column("decrease", justify="right", no_wrap=True)
     for cause in diagnosis.causes[:MOST_CAUSES]:
         values = "\n".join(f"{name} {estimate(value)}" for name, value in cause.parameters.items())
         table.add_row(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.box import SIMPLE_HEAD
@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 COMMAND = "trpac log check"
 EXIT_NOT_ENOUGH = 1
 """Exit code of a file that can be read and does not hold what an estimate needs."""
+
+HEADINGS = ("column", "source", "unit", "factor", "Hz", "lost", "range")
+OPTIONAL = ("factor", "lost")
+"""Columns of the table that are left out where they are empty."""
 
 app = typer.Typer(help="Recorded logs: check how a file is read.", no_args_is_help=True)
 
@@ -137,16 +141,22 @@ def check(
 def _show(console: Terminal, found: Understood) -> None:
     from sim2real.logs.inspection import column_reports
 
+    rows = [_row(column) for column in column_reports(found)]
     table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
-    for heading in ("column", "source", "unit", "factor", "Hz", "lost", "range"):
-        left = heading in ("column", "source", "unit")
-        justify: Literal["left", "right"] = "left" if left else "right"
-        if heading == "source":
-            table.add_column(heading, justify=justify, overflow="fold", min_width=10)
-        else:
-            table.add_column(heading, justify=justify, no_wrap=True)
-    for column in column_reports(found):
-        table.add_row(*_row(column))
+    shown = [
+        i for i, heading in enumerate(HEADINGS) if heading not in OPTIONAL or any(row[i] for row in rows)
+    ]
+    for heading in (HEADINGS[i] for i in shown):
+        wraps = heading in ("source", "range")
+        table.add_column(
+            heading,
+            justify="left" if heading in ("column", "source", "unit") else "right",
+            overflow="fold",
+            min_width=10 if wraps else None,
+            no_wrap=not wraps,
+        )
+    for row in rows:
+        table.add_row(*(row[i] for i in shown))
     console.print(table)
 
 

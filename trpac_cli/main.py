@@ -53,7 +53,10 @@ def _root(
 @app.command()
 def run(
     scenario: Annotated[
-        Path, typer.Argument(help="Scenario file, or the name of a shipped one: paper_simulation, road_test.")
+        Path,
+        typer.Argument(
+            help="Scenario file, or the name of a shipped one: paper_simulation, cruise_onto_snow."
+        ),
     ],
     out: Annotated[
         Path, typer.Option(help="Folder for report.html, figure17.png, log.csv and summary.json.")
@@ -68,6 +71,13 @@ def run(
         typer.Option(min=10_000.0, max=1e6, help="C_x in place of the vehicle's, in plant and unit [N]."),
     ] = None,
     method: MethodOption = "robust",
+    compare_camera: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Scenario that brakes on another road, such as cruise_onto_snow. It is run with and without its "
+            "camera; the report begins with TRPAC at brake onset, drawn in brake_onset.png. May be repeated."
+        ),
+    ] = None,
 ) -> None:
     """Run a scenario: plant, rendered and disturbed pictures, the unit under fmpy; write report and scores.
 
@@ -88,6 +98,7 @@ def run(
                 fmu=fmu,
                 kind=kind,
                 method=method,
+                compare_camera=compare_camera or (),
                 progress=progress,
             )
             finished.write(out, progress)
@@ -96,6 +107,8 @@ def run(
     console = Terminal()
     console.print(finished.verdict)
     console.print(_score_table(finished.summary))
+    for sentence in finished.brake_onsets:
+        console.print(sentence)
     console.print(f"Report: {out / 'report.html'}   figure: {out / 'figure17.png'}")
 
 

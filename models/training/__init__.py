@@ -1,4 +1,4 @@
 """Training of the networks in `models/`: one command, `python -m models.training --data DIR`.
 
-Needs the training extra (`pip install -r requirements/train.txt`); the estimator itself never imports this package.
+Needs the training extra (`pip install 'trpac-fmu[all,train]'`); the estimator itself never imports this package.
 """

@@ -36,7 +36,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--only",
         choices=("segmenter", "surface"),
-        help="train one network, the other file stays; surface: with the segmenter that lies in --out",
+        help="train one network, the other file stays; surface: with the segmenter in --out, or the package's, "
+        "and without road masks",
     )
     parser.add_argument(
         "--effort", type=float, default=1.0, help="share of the usual steps and rendered worlds (default: 1)"
@@ -65,7 +66,7 @@ def main(arguments: list[str] | None = None) -> int:
     missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
     if missing:
         print(
-            f"models.training: not installed: {', '.join(missing)}; run: pip install -r requirements/train.txt",
+            f"models.training: not installed: {', '.join(missing)}; run: pip install 'trpac-fmu[all,train]'",
             file=sys.stderr,
         )
         return 2

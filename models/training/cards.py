@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from trpac_core.vision.classes import Surface
 
-from .data import Picture
+from .data import FAMILIES, Picture
 from .patches import CAMERA_SPREAD, RENDERED_SPREAD
 from .rendered import STREETS
 from .scores import ClassScore, wilson_interval
@@ -35,6 +35,56 @@ command: `python -m models.training --data DIR`, where `DIR` holds the pictures 
 file, split, task, label, mask, sequence_id, licence, width and height, and in notes, if there are any, "night"."""
 
 
+LEFT_OUT_TEXT = """\
+## The surface, on sources left out
+
+Each source is judged by a surface that was learned without it; by the road that the masks find, which know it. The flag
+is up from the confidence at which no other source is wrong in more than 2 %. `python -m models.training.left_out --data
+DIR` writes this table and that of masks left out.
+
+{}
+
+"""
+CAMVID = """\
+CamVid 0001TP is the validation drive (dusk, another drive than the training ones); the spread of gain and gamma in
+training was widened for it, so its score is no test score. Real drivable masks of a test drive are not in the data.
+"""
+SEGMENTER_LIMITS = """\
+- Damp, matt asphalt without reflections is often taken for dry: most of the wet streets that are missed look so.
+- Snow by night is hardly in the data, and not found.
+- The whole picture depends on weather and place as much as on the road: where a wet road lies under a blue sky, or
+  snow is cleared, patches are more accurate.
+- No real picture has a shadow label. On real pictures the shadow task learns from painted shadows and that the
+  brighter half of a road and wet roads have none; the darker half stays unknown, so that unlabelled real shadows do
+  not teach "no shadow". How well it finds real shadows was only looked at; dark asphalt and dusk still pass for shadow
+  at times.
+- On rendered pictures much of the shadow is missed, see its IoU; what is called shadow is mostly right.
+- The edge between a snowy road and a snowy verge is a guess."""
+WEATHERED = """\
+Dry pictures of four dash cameras are shown wet and under snow too
+(`models/training/weathered.py`). """
+SURFACE_LIMITS = """\
+- The validation and test stills come from the same kind of web search as the training stills; other cameras are the
+  better estimate for a new car. Wet carries over worst: see its recall on other cameras and how few pictures that is.
+- Real wet and snowy dash frames in training come from one car, one clip each, and the val rows of these clips show the
+  same road seconds later. Rendered scores only show how well the network knows the renderer.
+- Damp, matt asphalt is labelled nowhere in the data. What is found for it is a guess; expect dry.
+- Night roads with reflected lights and wet cobbles are hardly covered. Gravel, soil and painted surfaces are not.
+- A road unlike those in training may look disturbed to the softening, and is less sure than it could be."""
+SQUASHED = """\
+Web stills are squashed by their source and used stretched back; only their lower centre counts. The `*_extreme` clips
+are used only where no text, path dots or bonnet cover the road.
+"""
+OWN_LIMITS = """\
+- The scores hold for cameras, roads and weather like those of the pictures below.
+- Pictures of one drive are alike: the intervals, which count pictures, are too narrow where there are few drives.
+- Scores on rendered pictures tell how well the network knows the renderer, no more."""
+OWN_LICENCES = """\
+## Licences of the pictures
+
+They are those of the table. Where a network of the package was used, its own card has the pictures behind it."""
+
+
 @dataclass
 class RunFacts:
     """What is the same for both cards of a run."""
@@ -51,6 +101,11 @@ class RunFacts:
 
     def __post_init__(self) -> None:
         self.versions = {name: importlib.metadata.version(name) for name in PACKAGES}
+
+    @property
+    def own(self) -> bool:
+        """Whether all pictures are of others than the package's sources."""
+        return not any(picture.family in FAMILIES for picture in self.pictures)
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -75,13 +130,19 @@ def splits_text(facts: RunFacts) -> str:
     worlds = ", ".join(
         f"{split} {count} worlds (seeds {facts.seeds[split]})" for split, count in facts.worlds.items()
     )
+    rendered = f"{worlds}; drawing or loading them took {facts.render_s:.0f} s."
+    if facts.own:
+        return (
+            "Real pictures are split by the manifest: no sequence stands in two splits.\nRendered pictures, three "
+            f"places in each world:\n{rendered}"
+        )
     return f"""\
 Real pictures are split by the manifest: no series of neighbouring pictures stands in two splits, except the three
 clips of one car (`*_extreme`) that are cut in time, first part train, a gap, last part val. `other_cameras` and all
 test rows are never trained on, and nothing was chosen by them. The rendered test scores were in view when the weather
 of the rendered worlds was decided: they are kinder than those of a renderer never seen.
 Rendered pictures, three places in each world, half of the worlds with the weather that is likely for their surface:
-{worlds}; drawing or loading them took {facts.render_s:.0f} s."""
+{rendered}"""
 
 
 def time_text(facts: RunFacts, train_s: float) -> str:
@@ -150,6 +211,11 @@ def surface_card(facts: RunFacts, outcome: Outcome, *, sha256: str, train_s: flo
     frozen = " or ".join(str(kind.frozen) for kind in kinds)
     weights = " : ".join(f"{say:g}" for say in stage.says)
     left_out = f"Left out: {', '.join(facts.without)}. " if facts.without else ""
+    weathered = "" if facts.own else WEATHERED
+    weigh = "" if facts.own else ", so that wet and snowy dash frames weigh as much as dry ones"
+    limits, squashed, licences = (
+        (OWN_LIMITS, "", OWN_LICENCES) if facts.own else (SURFACE_LIMITS, SQUASHED, LICENCE_TEXT)
+    )
     return f"""\
 # surface.onnx
 
@@ -176,9 +242,8 @@ means and deviations between their own and another patch's (Zhou et al. 2021, Do
 Patches are 3:2 to 3:1 wide before they are squeezed to the input, from 48 pixels to nearly the whole width of the road.
 They are mirrored, shifted, zoomed by up to 12 % and seen with the resolution, gain, gamma and white balance of other
 cameras (within {100 * CAMERA_SPREAD:.0f} %; {100 * RENDERED_SPREAD:.0f} % for rendered ones, whose worlds
-have drawn theirs already). Dry pictures of four dash cameras are shown wet and under snow too
-(`models/training/weathered.py`). {left_out}Classes are drawn equally often and sources within a class by
-fixed shares, so that wet and snowy dash frames weigh as much as dry ones. Cross-entropy, AdamW, running average of the
+have drawn theirs already). {weathered}{left_out}Classes are drawn equally often and sources within a class by
+fixed shares{weigh}. Cross-entropy, AdamW, running average of the
 weights.
 A trunk learns at two fifths of the others' rate, its first {frozen} blocks not at all, nor the statistics of their
 batch norms. {stage.told()}. All together, but for what was kept: {time_text(facts, train_s)}
@@ -220,23 +285,15 @@ worst bin however few patches it holds.
 
 ## Limits
 
-- The validation and test stills come from the same kind of web search as the training stills; other cameras are the
-  better estimate for a new car. Wet carries over worst: see its recall on other cameras and how few pictures that is.
-- Real wet and snowy dash frames in training come from one car, one clip each, and the val rows of these clips show the
-  same road seconds later. Rendered scores only show how well the network knows the renderer.
-- Damp, matt asphalt is labelled nowhere in the data. What is found for it is a guess; expect dry.
-- Night roads with reflected lights and wet cobbles are hardly covered. Gravel, soil and painted surfaces are not.
-- A road unlike those in training may look disturbed to the softening, and is less sure than it could be.
+{limits}
 
 ## Data
 
 {splits_text(facts)}
-Web stills are squashed by their source and used stretched back; only their lower centre counts. The `*_extreme` clips
-are used only where no text, path dots or bonnet cover the road.
-
+{squashed}
 {data_table(facts.pictures)}
 
-{LICENCE_TEXT}
+{licences}
 """
 
 
@@ -263,6 +320,11 @@ def segmenter_card(
     views = Counter(view.kind for view in road.material.training.views)
     kinds = ", ".join(f"{kind} {count}" for kind, count in sorted(views.items()))
     kind = road.net.trunk.kind
+    validation, left_out_text, limits, licences = (
+        ("", "", OWN_LIMITS, OWN_LICENCES)
+        if facts.own
+        else (CAMVID, LEFT_OUT_TEXT.format(left_out), SEGMENTER_LIMITS, LICENCE_TEXT)
+    )
     return f"""\
 # segmenter.onnx
 
@@ -297,36 +359,17 @@ times {road.scale:.3f}, which makes the true classes of sources left out likelie
 {time_text(facts, train_s)}
 {versions_text(facts)}
 
-## The surface, on sources left out
-
-Each source is judged by a surface that was learned without it; by the road that the masks find, which know it. The flag
-is up from the confidence at which no other source is wrong in more than 2 %. `python -m models.training.left_out --data
-DIR` writes this table and that of masks left out.
-
-{left_out}
-
-## The masks
+{left_out_text}## The masks
 
 At probability 0.5, whole pictures; unknown pixels are left out.
 
 {segmentation_table(scores)}
 
-CamVid 0001TP is the validation drive (dusk, another drive than the training ones); the spread of gain and gamma in
-training was widened for it, so its score is no test score. Real drivable masks of a test drive are not in the data.
-"painted" means painted shadows, judged on the road in them and within 15 pixels around.
+{validation}"painted" means painted shadows, judged on the road in them and within 15 pixels around.
 
 ## Limits
 
-- Damp, matt asphalt without reflections is often taken for dry: most of the wet streets that are missed look so.
-- Snow by night is hardly in the data, and not found.
-- The whole picture depends on weather and place as much as on the road: where a wet road lies under a blue sky, or
-  snow is cleared, patches are more accurate.
-- No real picture has a shadow label. On real pictures the shadow task learns from painted shadows and that the
-  brighter half of a road and wet roads have none; the darker half stays unknown, so that unlabelled real shadows do
-  not teach "no shadow". How well it finds real shadows was only looked at; dark asphalt and dusk still pass for shadow
-  at times.
-- On rendered pictures much of the shadow is missed, see its IoU; what is called shadow is mostly right.
-- The edge between a snowy road and a snowy verge is a guess.
+{limits}
 
 ## Data
 
@@ -334,7 +377,7 @@ training was widened for it, so its score is no test score. Real drivable masks 
 
 {data_table(facts.pictures)}
 
-{LICENCE_TEXT}
+{licences}
 """
 
 

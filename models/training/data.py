@@ -30,6 +30,16 @@ STREET_SOURCES = {"cws8262": ("cws8262", "cws8262"), "sidhardha36": ("bdd_day", 
 ROAD_IS_FOUND = frozenset(name for names in STREET_SOURCES.values() for name in names)
 """Families whose patches are cut where the segmenter finds road, of all classes alike: of cws8262 only wet and snowy
 pictures have a mask, so that masks would tell the class."""
+FAMILIES = ROAD_IS_FOUND | {
+    "condition_web",
+    "drivable_camvid",
+    "drivable_lums",
+    "dry_udacity",
+    "other_cameras",
+    "seq_dry_yolop",
+    "seq_extreme",
+}
+"""Families that the shipped networks were trained and judged on: what cards say of data holds for these alone."""
 SQUASHED = ("condition_web", "cws8262")
 """Sources that have squeezed their pictures to squares."""
 
@@ -125,6 +135,11 @@ class Picture:
         """See `family_of`."""
         return family_of(self.source)
 
+    @property
+    def road_is_found(self) -> bool:
+        """Whether the segmenter finds the road that patches are cut on: no mask and no road box says where it is."""
+        return self.family in ROAD_IS_FOUND or (self.mask is None and _road_boxes(self.source) is None)
+
     def clear_parts(self) -> list[Image]:
         """What one would show of the picture: all of it, or its parts without text and bonnet."""
         image = self.image()
@@ -144,7 +159,7 @@ class Picture:
         """Road boxes of a picture without a mask, as fractions of its width and height."""
         boxes = _road_boxes(self.source)
         if boxes is None:
-            raise DataFolderError(f"{self.path}: {_no_road_box(self.source)}")
+            raise DataFolderError(f"{self.path}: no road box is known for source '{self.source}'")
         return boxes
 
 
@@ -274,26 +289,19 @@ def _road_boxes(source: str) -> tuple[Box, ...] | None:
     return ROAD_BOXES.get(source, ROAD_BOXES.get(family_of(source)))
 
 
-def _no_road_box(source: str) -> str:
-    return (
-        f"no road box is known for source '{source}' (known: {', '.join(sorted(ROAD_BOXES))}); add one to ROAD_BOXES "
-        "in models/training/data.py"
-    )
-
-
-def check_trainable(pictures: list[Picture]) -> None:
-    """Raise DataFolderError with all that is lacking for a training run."""
+def check_trainable(pictures: list[Picture], *, masks: bool = True) -> None:
+    """Raise DataFolderError with all that is lacking for a training run; `masks` are what the segmenter learns from."""
     lacking = []
     for split in ("train", "val"):
-        if not of_split(pictures, split, masked=True):
-            lacking.append(f"split {split} holds no picture with a road mask (task seg)")
+        if masks and not of_split(pictures, split, masked=True):
+            lacking.append(
+                f"split {split} holds no picture with a road mask (task seg), from which the segmenter learns; "
+                "--only surface needs none"
+            )
         for label, surface in LABELS.items():
             count = sum(picture.surface == surface for picture in of_split(pictures, split))
             if count < MIN_EACH_CLASS:
                 lacking.append(f"split {split} holds no picture labelled {label}")
-    boxed = (p for p in pictures if not p.mask and p.split != "gap" and p.family not in ROAD_IS_FOUND)
-    unmasked = sorted({picture.source for picture in boxed})
-    lacking += [_no_road_box(source) for source in unmasked if _road_boxes(source) is None]
     if lacking:
         raise DataFolderError("the data folder lacks what training needs:\n  " + "\n  ".join(lacking))
 

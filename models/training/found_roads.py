@@ -10,7 +10,7 @@ import numpy as np
 
 from trpac_core.vision.networks import RoadSegmenter
 
-from .data import ROAD_IS_FOUND, Image, Picture
+from .data import Image, Picture
 
 LEAST_DRIVABLE = 0.5
 """Probability from which a pixel counts as road [-]."""
@@ -33,8 +33,8 @@ class FoundRoad(Picture):
 
 
 def with_found_roads(pictures: Iterable[Picture], segmenter: RoadSegmenter) -> list[Picture]:
-    """The pictures, those of the families in `ROAD_IS_FOUND` as `FoundRoad`."""
-    return [found_road(p, segmenter) if p.family in ROAD_IS_FOUND else p for p in pictures]
+    """The pictures, those whose road is to be found as `FoundRoad`."""
+    return [found_road(p, segmenter) if p.road_is_found else p for p in pictures]
 
 
 def found_road(picture: Picture, segmenter: RoadSegmenter) -> FoundRoad:

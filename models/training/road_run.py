@@ -86,7 +86,9 @@ class Surfaces:
     def left_out(self) -> NDArray[np.float64]:
         """Logits of the plain pictures, each by the head that was learned without its source, shape (n, 3)."""
         logits = np.zeros((len(self.plain), 3))
-        for families in SOURCES.values():
+        known = {family for families in SOURCES.values() for family in families}
+        others = [(str(family),) for family in np.unique(self.plain_families) if family not in known]
+        for families in (*SOURCES.values(), *others):
             own = np.isin(self.plain_families, families)
             if own.any():
                 logits[own] = self.head(families).logits(self.plain[own])

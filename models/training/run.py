@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import ctypes
+import shutil
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from pathlib import Path
 import torch
 from rich.progress import Progress
 
+from scenarios.library import networks_folder
 from trpac_core.vision.networks import Segmenter
 
 from . import cards
@@ -61,7 +63,7 @@ class Rendered:
 def train_all(given: argparse.Namespace, arguments: Sequence[str]) -> None:
     """Train, calibrate, export and document what the command line asks for."""
     pictures = read_manifest(given.data)
-    check_trainable(pictures)
+    check_trainable(pictures, masks=given.only != "surface")
     _keep_memory()
     torch.set_num_threads(given.threads)
     torch.use_deterministic_algorithms(mode=given.device == "cpu")
@@ -111,8 +113,11 @@ def _networks(
 
 
 def _seen(given: argparse.Namespace, pictures: Sequence[Picture]) -> list[Picture]:
-    """The pictures with the roads that the segmenter in the folder finds."""
-    return with_found_roads(pictures, Segmenter(given.out / "segmenter.onnx", given.threads))
+    """The pictures with the roads that the segmenter in the folder finds; the package's is put there if none is."""
+    path = given.out / "segmenter.onnx"
+    if not path.is_file():
+        shutil.copy(networks_folder() / path.name, path)
+    return with_found_roads(pictures, Segmenter(path, given.threads))
 
 
 def _keep_memory() -> None:
@@ -183,7 +188,9 @@ def _segmenter(
     real = [masked_sample(picture) for picture in of_split(facts.pictures, "val", masked=True)]
     painted = painted_views(real, seed=given.seed)
     found = {
-        "real: CamVid 0001TP (val)": {"drivable": score_segmenter(road.net, real, "drivable")},
+        "real (val)" if facts.own else "real: CamVid 0001TP (val)": {
+            "drivable": score_segmenter(road.net, real, "drivable")
+        },
         "real, painted (val)": {
             task: score_segmenter(road.net, painted, task) for task in ("drivable", "shadow")
         },

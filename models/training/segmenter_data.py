@@ -79,7 +79,7 @@ def sample_of(picture: Picture) -> Sample:
     """A real picture with what is known of its road."""
     if picture.mask is not None:
         return masked_sample(picture)
-    return street_sample(picture) if picture.family in ROAD_IS_FOUND else weak_sample(picture)
+    return street_sample(picture) if picture.road_is_found else weak_sample(picture)
 
 
 def masked_sample(picture: Picture) -> Sample:

@@ -9,19 +9,19 @@ from scenarios.effects.base import Array, Effect, Signals, parameter
 
 @dataclass(frozen=True)
 class AccelerometerBias(Effect):
-    """The accelerometer reads a constant too much or too little: its own offset, or a tilted mounting."""
+    """The accelerometer has a constant offset, from the sensor itself or from a tilted mounting."""
 
     id = "accelerometer_bias"
     stage = "sensors"
     subsystem = "accelerometer"
     equation = "a_read = a + bias"
     source = "definition"
-    excited_by = "any driving: accelerometer against the change of speed"
+    excited_by = "any driving: accelerometer compared with the change of speed"
     confounders = ("road_grade",)
 
     bias_m_s2: float = parameter(
         "m/s^2",
-        "reading at rest on level ground",
+        "reading at standstill on level ground",
         neutral=0.0,
         low=-5.0,
         high=5.0,

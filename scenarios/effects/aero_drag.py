@@ -10,12 +10,12 @@ from scenarios.plant.parameters import DynamicsParameters
 AIR_DENSITY_KG_M3 = 1.225
 """Density of air at sea level and 15 degrees Celsius, ISO 2533 standard atmosphere [kg/m^3]."""
 AIR_DENSITY_SHARE = 0.025
-"""By which the air's density is open: 1.2 kg/m^3, as many take it, of dry air at 20 degrees and 1010 hPa [-]."""
+"""Relative uncertainty of the air density: 1.2 kg/m^3 (dry air, 20 degrees, 1010 hPa) is common, too [-]."""
 
 
 @dataclass(frozen=True)
 class AeroDrag(Effect):
-    """Air drag in still air; lift and the drag's pitching moment are left out."""
+    """Air drag without wind; lift and the pitching moment of the drag are neglected."""
 
     id = "aero_drag"
     stage = "dynamics"

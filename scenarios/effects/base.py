@@ -40,6 +40,9 @@ Value = float | Callable[["Vehicle"], float]
 Values = tuple[float, ...] | Callable[["Vehicle"], tuple[float, ...]]
 """Numbers, or a function of the vehicle."""
 
+SHARE_OF_MEAN = "relative deviation from the mean"
+"""Meaning of the parameters that give each axle or wheel its own value."""
+
 LEAST_OFF = 0.25
 """Least offset of each wheel over the mean offset of the four, for `all_are_off` [-]."""
 
@@ -95,12 +98,12 @@ def parameter(
 
 def share_of_axles(start: float, most: float) -> Any:
     """Declare the parameter `unlike` of `of_each_wheel`, beside a parameter that is the mean of all wheels."""
-    return _share_of_mean("the front axle has more and the rear less", start, most)
+    return _share_of_mean("front axle more, rear axle less", start, most)
 
 
 def share_of_sides(axle: str, start: float, most: float) -> Any:
     """Declare the parameter `front_sides` or `rear_sides` of `of_each_wheel`, for the axle "front" or "rear"."""
-    return _share_of_mean(f"the {axle} left wheel has more and the {axle} right one less", start, most)
+    return _share_of_mean(f"{axle} left wheel more, {axle} right wheel less", start, most)
 
 
 def of_each_wheel(
@@ -134,9 +137,9 @@ def all_are_off(values: PerWheel, nominal: float) -> bool:
     return bool(np.all(off * np.sign(off.mean()) >= LEAST_OFF * abs(off.mean())))
 
 
-def _share_of_mean(who: str, start: float, most: float) -> Any:
+def _share_of_mean(what: str, start: float, most: float) -> Any:
     return parameter(
-        "-", f"share of the mean that {who}", neutral=0.0, low=-most, high=most, starts=(-start, start)
+        "-", f"{SHARE_OF_MEAN}: {what}", neutral=0.0, low=-most, high=most, starts=(-start, start)
     )
 
 

@@ -10,7 +10,7 @@ from scenarios.plant.parameters import DynamicsParameters
 
 @dataclass(frozen=True)
 class BrakeDrag(Effect):
-    """A constant moment against every turning wheel; it holds a resting wheel and never turns it back."""
+    """A constant torque opposes the rotation of every wheel; a wheel at standstill stays at standstill."""
 
     id = "brake_drag"
     form = "all wheels alike"
@@ -37,7 +37,7 @@ class BrakeDrag(Effect):
 
 @dataclass(frozen=True)
 class BrakeDragOfAxles(BrakeDrag):
-    """The brakes of one axle drag more than those of the other; `torque_nm` is the mean of all wheels."""
+    """The brakes of one axle drag more; `torque_nm` is the mean of all wheels."""
 
     form = "axles unlike"
     equation = "T_drag (1 + unlike) in front, T_drag (1 - unlike) in the rear"

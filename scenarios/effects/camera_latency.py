@@ -12,10 +12,9 @@ from scenarios.effects.frames import Frames
 
 @dataclass(frozen=True)
 class CameraLatency(Effect):
-    """Results that the system stamps with where the car is when they arrive, though the picture is older.
+    """Results are stamped with the position of the car at their arrival, although the picture is older.
 
-    The stamp lies ahead of the road that was seen by the way driven meanwhile, so every change of class appears that
-    much later along the road.
+    Every change of class appears farther along the road by the distance driven in the meantime.
     """
 
     id = "camera_latency"
@@ -23,7 +22,7 @@ class CameraLatency(Effect):
     subsystem = "camera"
     equation = "stamp = place seen + X(t) - X(t - delay), which is v delay at constant speed"
     source = "Eq. (11) of Tian et al. (2022), doi:10.3390/rs14215583, with the position taken at arrival"
-    excited_by = "passing borders of surfaces at two or more speeds"
+    excited_by = "surface borders passed at two or more speeds"
     confounders = ("camera_pitch",)
 
     delay_s: float = parameter(

@@ -42,10 +42,10 @@ def seen_distance_m(
 
 @dataclass(frozen=True)
 class CameraPitch(Effect):
-    """A camera that looks down more (or less) than its file says.
+    """The camera is pitched differently from its file.
 
-    Nose down it sees road nearer than stamped, so every change of class appears later along the road. Stamps begin at
-    the preview distance whatever the speed, so by a distance that hardly depends on speed.
+    A camera that is pitched down sees road nearer than its stamp. Every change of class then appears farther along the
+    road, by a distance that hardly depends on speed.
     """
 
     id = "camera_pitch"
@@ -53,12 +53,12 @@ class CameraPitch(Effect):
     subsystem = "camera"
     equation = "end seen = h / tan(atan(h / end stamped) + pitch), either end of a stretch"
     source = "Geometry of a pinhole camera over a flat road, Eqs. (5) and (6) of Tian et al. (2022)"
-    excited_by = "passing borders of surfaces at two or more speeds"
+    excited_by = "surface borders passed at two or more speeds"
     confounders = ("camera_latency",)
 
     pitch_rad: float = parameter(
         "rad",
-        "real camera's pitch minus the camera file's, nose down",
+        "additional pitch over the camera file, nose down positive",
         neutral=0.0,
         low=-0.4,
         high=0.4,

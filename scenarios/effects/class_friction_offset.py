@@ -13,17 +13,17 @@ from trpac_core.vision.classes import CLASS_THETA, Surface
 
 @dataclass(frozen=True)
 class ClassFrictionOffset(Effect):
-    """The classes' friction values on this road, where they are not dry 0.8, wet 0.6, snow and ice 0.2.
+    """The friction values of the surface classes differ from dry 0.8, wet 0.6, snow and ice 0.2.
 
-    The places of the classes stay; a friction reference lies beside the usual value.
+    The positions of the classes do not change; a friction reference differs from the usual value.
     """
 
     id = "class_friction_offset"
     stage = "perception"
     subsystem = "camera"
-    equation = "mu_reference = this road's value of the class"
+    equation = "mu_reference = value of the class on this road"
     source = "class values: section 4.1 of Tian et al. (2022), doi:10.3390/rs14215583"
-    excited_by = "driving on each class with a friction reference"
+    excited_by = "driving on every class with a friction reference"
     confounders = ("friction_offset",)
 
     dry: float = parameter(

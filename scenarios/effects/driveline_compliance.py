@@ -21,10 +21,9 @@ LEAST_MOTOR_SHARE = 0.02
 
 @dataclass(frozen=True)
 class DrivelineCompliance(Effect):
-    """Motor and wheel turn on the two ends of a shaft; driving and braking torque both act at the motor.
+    """Motor and wheel are connected by a torsional spring; driving and braking torque act at the motor.
 
-    The motor's inertia J is a part of the wheel's I, so that a stiff shaft is the plant without it; below 2 % of I the
-    driveline counts as rigid.
+    The motor inertia J is a part of the wheel inertia I. Below 2 % of I the driveline is rigid.
     """
 
     id = "driveline_compliance"
@@ -52,7 +51,7 @@ class DrivelineCompliance(Effect):
     )
     motor_inertia_kg_m2: float = parameter(
         "kg m^2",
-        "part of the wheel's inertia that turns with the motor; 0 is a rigid driveline",
+        "part of the wheel inertia on the motor's end of the shaft; 0 is rigid",
         neutral=0.0,
         low=0.0,
         high=lambda car: LARGEST_MOTOR_SHARE * car.wheel_inertia_kg_m2,
@@ -73,7 +72,7 @@ class DrivelineCompliance(Effect):
 
 @dataclass(frozen=True)
 class DrivelineComplianceOfAxles(DrivelineCompliance):
-    """The shafts of one axle are the longer or thinner ones; `stiffness_nm_rad` is the mean."""
+    """The shafts of the two axles differ; `stiffness_nm_rad` is the mean."""
 
     form = "axles unlike"
     equation = "k (1 + unlike) in front, k (1 - unlike) in the rear"
@@ -83,7 +82,7 @@ class DrivelineComplianceOfAxles(DrivelineCompliance):
 
 @dataclass(frozen=True)
 class DrivelineComplianceOfWheels(DrivelineComplianceOfAxles):
-    """Each shaft has its own length, as where a motor stands off the middle; `stiffness_nm_rad` is the mean."""
+    """Each shaft has its own stiffness, for example by its length; `stiffness_nm_rad` is the mean."""
 
     form = "each wheel its own"
     of_wheels = True

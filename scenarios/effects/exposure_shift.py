@@ -25,23 +25,23 @@ def share_left(stops: float) -> float:
 
 @dataclass(frozen=True)
 class ExposureShift(Effect):
-    """Pictures exposed too long (stops above 0) or too short.
+    """Pictures are overexposed (stops above 0) or underexposed.
 
-    Confidence is taken as that of a calibrated chain, which falls with the share of right classes. The shipped
-    networks' own Q_v does not do so below 3 stops: Dempster's rule keeps it near 1 whatever the patches say.
+    The law is that of a calibrated chain, whose confidence is its share of right classes. The confidence of the shipped
+    networks hardly falls below 3 stops, because Dempster's rule keeps it near 1.
     """
 
     id = "exposure_shift"
     stage = "perception"
     subsystem = "camera"
     equation = "Q_v and share of right classes times exp(-(stops / 4.3)^2); linear light times 2^stops"
-    source = "measured on the shipped networks, benchmarks/vision/measure_camera_laws.py"
-    excited_by = "any drive with a known normal confidence, best with the pictures themselves"
+    source = "measured: benchmarks/vision/measure_camera_laws.py"
+    excited_by = "any drive with a known normal confidence; best with the pictures"
     confounders = ("motion_blur",)
 
     stops: float = parameter(
         "stops",
-        "exposure error, overexposed positive",
+        "exposure error; overexposed is positive",
         neutral=0.0,
         low=-6.0,
         high=6.0,

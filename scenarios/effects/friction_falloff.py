@@ -10,7 +10,7 @@ from scenarios.plant.parameters import DynamicsParameters
 
 @dataclass(frozen=True)
 class FrictionFalloff(Effect):
-    """Adhesion falls exponentially with the tyre's sliding speed, towards a floor."""
+    """Friction falls exponentially with the sliding speed of the tyre, to a lower limit."""
 
     id = "friction_falloff"
     form = "exponential"
@@ -25,7 +25,7 @@ class FrictionFalloff(Effect):
 
     falloff_s_m: float = parameter(
         "s/m",
-        "rate of the fall per sliding speed",
+        "rate of the fall over sliding speed",
         neutral=0.0,
         low=0.0,
         high=5.0,
@@ -33,7 +33,7 @@ class FrictionFalloff(Effect):
     )
     floor: float = parameter(
         "-",
-        "share of the adhesion that is left at high sliding speed",
+        "share of the friction that is left at high sliding speed",
         neutral=1.0,
         low=0.05,
         high=1.0,
@@ -41,13 +41,13 @@ class FrictionFalloff(Effect):
     )
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """Each wheel's adhesion falls with its own sliding speed."""
+        """The friction of each wheel falls with its sliding speed."""
         return parameters._replace(falloff_s_m=self.falloff_s_m, falloff_floor=self.floor)
 
 
 @dataclass(frozen=True)
 class FrictionFalloffHyperbolic(FrictionFalloff):
-    """Adhesion falls as fast at first, and ever more slowly then: the floor is far off."""
+    """The same initial fall, then slower."""
 
     form = "hyperbolic"
     equation = "theta_eff = theta (floor + (1 - floor) / (1 + falloff abs(omega R - v)))"

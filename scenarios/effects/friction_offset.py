@@ -10,19 +10,19 @@ from scenarios.plant.parameters import RoadTable
 
 @dataclass(frozen=True)
 class FrictionOffset(Effect):
-    """The road is grippier or more slippery than its file says, everywhere by the same factor."""
+    """The friction of the whole road differs from the road file by one factor."""
 
     id = "friction_offset"
     stage = "road"
     subsystem = "road"
     equation = "theta_true = factor theta"
     source = "definition"
-    excited_by = "driving or braking near the grip limit"
+    excited_by = "driving or braking near the friction limit"
     confounders = ("mu_split", "tyre_stiffness_offset", "friction_falloff", "load_transfer")
 
     factor: float = parameter(
         "-",
-        "true friction per the road file's",
+        "true friction over that of the road file",
         neutral=1.0,
         low=0.1,
         high=3.0,

@@ -10,19 +10,19 @@ from scenarios.plant.parameters import DynamicsParameters
 
 @dataclass(frozen=True)
 class LoadTransfer(Effect):
-    """Acceleration moves load from the front to the rear axle, in phase with it (stiff suspension)."""
+    """Acceleration shifts load from the front to the rear axle without delay (rigid suspension)."""
 
     id = "load_transfer"
     stage = "dynamics"
     subsystem = "vehicle"
     equation = "F_z,front = m (g l_r - a_x h) / (2 L) per wheel, F_z,rear = m (g l_f + a_x h) / (2 L)"
     source = "Gillespie (1992), Fundamentals of Vehicle Dynamics, ch. 1, dynamic axle loads on level ground"
-    excited_by = "strong acceleration or braking on a tyre near its grip limit"
+    excited_by = "strong acceleration or braking near the friction limit"
     confounders = ("friction_offset", "tyre_stiffness_offset")
 
     cog_height_m: float = parameter(
         "m",
-        "height of the centre of gravity that the transfer acts through",
+        "height of the centre of gravity",
         neutral=0.0,
         low=0.0,
         high=1.5,

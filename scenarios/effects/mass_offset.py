@@ -10,7 +10,7 @@ from scenarios.plant.parameters import DynamicsParameters
 
 @dataclass(frozen=True)
 class MassOffset(Effect):
-    """The car is heavier or lighter than its file says; its centre of gravity stays where it is."""
+    """The mass differs from the vehicle file; the centre of gravity does not move."""
 
     id = "mass_offset"
     form = "in the middle"
@@ -18,12 +18,12 @@ class MassOffset(Effect):
     subsystem = "vehicle"
     equation = "(m + m_payload) v' = sum F; loads with m + m_payload"
     source = "Newton's second law"
-    excited_by = "changes of torque: the acceleration per force"
+    excited_by = "changes of torque: acceleration over force"
     confounders = ("torque_gain", "aero_drag", "road_grade", "wheel_radius_offset")
 
     mass_kg: float = parameter(
         "kg",
-        "payload, on top of the vehicle's mass",
+        "payload in addition to the mass of the vehicle file",
         neutral=0.0,
         low=lambda car: -0.3 * car.mass_kg,
         high=lambda car: 1.0 * car.mass_kg,
@@ -37,15 +37,15 @@ class MassOffset(Effect):
 
 @dataclass(frozen=True)
 class MassOffsetPlaced(MassOffset):
-    """The payload lies somewhere along the car and takes the centre of gravity with it."""
+    """The payload moves the centre of gravity along the car."""
 
     form = "where it lies"
-    equation = "as in the middle; the centre of gravity moves back by behind m_payload / (m + m_payload)"
+    equation = "the same; the centre of gravity moves back by behind m_payload / (m + m_payload)"
     source = "Statics: the moments of the weights about an axle"
 
     behind_m: float = parameter(
         "m",
-        "how far behind the car's centre of gravity the payload lies",
+        "distance of the payload behind the centre of gravity",
         neutral=0.0,
         low=lambda car: -1.2 * car.cog_to_front_axle_m,
         high=lambda car: 1.2 * car.cog_to_rear_axle_m,

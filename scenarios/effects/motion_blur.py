@@ -26,19 +26,19 @@ def share_left(speed_m_s: NDArray[np.float64], exposure_s: float) -> NDArray[np.
 
 @dataclass(frozen=True)
 class MotionBlur(Effect):
-    """The road moves by speed times exposure while the shutter is open; confidence as in `exposure_shift`."""
+    """The picture is blurred by speed times exposure time; confidence as in `exposure_shift`."""
 
     id = "motion_blur"
     stage = "perception"
     subsystem = "camera"
     equation = "Q_v and share of right classes times exp(-v exposure / 4 m)"
-    source = "measured on the shipped networks, benchmarks/vision/measure_camera_laws.py"
-    excited_by = "driving slowly and fast on the same surface"
+    source = "measured: benchmarks/vision/measure_camera_laws.py"
+    excited_by = "low and high speed on the same surface"
     confounders = ("exposure_shift",)
 
     exposure_s: float = parameter(
         "s",
-        "time for which the shutter is open beyond what the simulation models",
+        "exposure time in addition to the simulation's",
         neutral=0.0,
         low=0.0,
         high=0.2,

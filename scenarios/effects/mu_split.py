@@ -11,14 +11,14 @@ from scenarios.plant.parameters import RoadTable
 from trpac_core.vehicle import Vehicle
 
 LEAST_SPLIT = 0.01
-"""Difference of the factors from which the sides differ [-]."""
+"""Difference of the factors from which on left and right differ [-]."""
 
 
 @dataclass(frozen=True)
 class MuSplit(Effect):
-    """The friction under the left and the right wheels differs from the road file's by a factor each.
+    """The friction under the left and under the right wheels differs from the road file by one factor each.
 
-    The car still drives straight on.
+    The car still drives straight.
     """
 
     id = "mu_split"
@@ -26,12 +26,12 @@ class MuSplit(Effect):
     subsystem = "road"
     equation = "theta_left = left_factor theta, theta_right = right_factor theta"
     source = "definition; manoeuvre as in ISO 14512"
-    excited_by = "driving or braking near the grip limit: one side's wheels slip more"
+    excited_by = "driving or braking near the friction limit: more slip at the left or at the right wheels"
     confounders = ("friction_offset", "friction_falloff")
 
     left_factor: float = parameter(
         "-",
-        "true friction left per the road file's",
+        "true friction on the left over that of the road file",
         neutral=1.0,
         low=0.05,
         high=3.0,
@@ -39,7 +39,7 @@ class MuSplit(Effect):
     )
     right_factor: float = parameter(
         "-",
-        "true friction right per the road file's",
+        "true friction on the right over that of the road file",
         neutral=1.0,
         low=0.05,
         high=3.0,
@@ -51,5 +51,5 @@ class MuSplit(Effect):
         return abs(self.left_factor - self.right_factor) >= LEAST_SPLIT
 
     def road(self, table: RoadTable) -> RoadTable:
-        """Each side's friction is scaled."""
+        """The friction on the left and on the right is scaled."""
         return table._replace(theta=table.theta * np.array([self.left_factor, self.right_factor]))

@@ -12,9 +12,9 @@ from trpac_core.vehicle import GRAVITY_M_S2
 
 @dataclass(frozen=True)
 class RoadGrade(Effect):
-    """A road that rises or falls evenly; the car never rolls backwards on it.
+    """The road has a constant grade; the car never rolls backwards.
 
-    The accelerometer reads what the tyres and the air do, so v' + g sin of the road's angle.
+    The accelerometer reads v' plus g times the sine of the road angle.
     """
 
     id = "road_grade"
@@ -22,12 +22,12 @@ class RoadGrade(Effect):
     subsystem = "road"
     equation = "F = -m g s / sqrt(1 + s^2); loads times 1 / sqrt(1 + s^2)"
     source = "Gillespie (1992), Fundamentals of Vehicle Dynamics, ch. 1, loads on grades"
-    excited_by = "any driving, best with little torque; speed against accelerometer shows it"
+    excited_by = "any driving, best with low torque: speed compared with the accelerometer"
     confounders = ("accelerometer_bias", "rolling_resistance", "mass_offset", "aero_drag")
 
     grade: float = parameter(
         "-",
-        "rise per run, positive uphill",
+        "rise over run, positive uphill",
         neutral=0.0,
         low=-0.3,
         high=0.3,

@@ -10,7 +10,7 @@ from scenarios.plant.parameters import DynamicsParameters
 
 @dataclass(frozen=True)
 class RollingResistance(Effect):
-    """A moment against each loaded wheel's rotation; it holds a resting wheel and never turns it back."""
+    """A torque proportional to the wheel load opposes the rotation; a wheel at standstill stays at standstill."""
 
     id = "rolling_resistance"
     form = "moment at the wheels"
@@ -23,7 +23,7 @@ class RollingResistance(Effect):
 
     coefficient: float = parameter(
         "-",
-        "resisting force at the contact per vertical load",
+        "resisting force over vertical load",
         neutral=0.0,
         low=0.0,
         high=0.3,
@@ -37,7 +37,7 @@ class RollingResistance(Effect):
 
 @dataclass(frozen=True)
 class RollingResistanceForce(RollingResistance):
-    """The same as a force on the body, at the wheels' hubs: the wheels' own balance does not see it."""
+    """The same as a force on the body; the wheels' torque balance does not contain it."""
 
     form = "force on the body"
     equation = "m v' = sum F_x - c sum F_z"
@@ -49,7 +49,7 @@ class RollingResistanceForce(RollingResistance):
 
 @dataclass(frozen=True)
 class RollingResistanceOfAxles(RollingResistance):
-    """The tyres of one axle roll harder than those of the other, worn or soft ones; `coefficient` is the mean."""
+    """The tyres of the two axles differ; `coefficient` is the mean."""
 
     form = "axles unlike"
     equation = "c (1 + unlike) in front, c (1 - unlike) in the rear"

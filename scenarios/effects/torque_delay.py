@@ -12,7 +12,7 @@ from scenarios.effects.shifting import delayed
 
 @dataclass(frozen=True)
 class TorqueDelay(Effect):
-    """The torque comes some time after its command; before that the first row's command holds."""
+    """The torque follows its command after a dead time; before that the command of the first row holds."""
 
     id = "torque_delay"
     stage = "actuators"

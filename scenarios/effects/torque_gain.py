@@ -13,7 +13,7 @@ FRONT_LESS_REAR = np.array([1.0, 1.0, -1.0, -1.0])
 
 @dataclass(frozen=True)
 class TorqueGain(Effect):
-    """Motors and brakes make more or less torque than commanded, always by the same factor."""
+    """Motors and brakes produce the commanded torque times one factor."""
 
     id = "torque_gain"
     form = "all wheels alike"
@@ -26,7 +26,7 @@ class TorqueGain(Effect):
 
     factor: float = parameter(
         "-",
-        "true torque per command",
+        "true torque over command",
         neutral=1.0,
         low=0.2,
         high=3.0,
@@ -40,14 +40,14 @@ class TorqueGain(Effect):
 
 @dataclass(frozen=True)
 class TorqueGainOfAxles(TorqueGain):
-    """The factor is another one at the front and at the rear; `factor` is their mean."""
+    """The factors of the two axles differ; `factor` is the mean."""
 
     form = "axles unlike"
     equation = "T_true = (factor + unlike) T in front, (factor - unlike) T in the rear"
 
     unlike: float = parameter(
         "-",
-        "half of what the front axle's factor has more than the rear's",
+        "half of the difference, front minus rear",
         neutral=0.0,
         low=-0.5,
         high=0.5,
@@ -61,14 +61,14 @@ class TorqueGainOfAxles(TorqueGain):
 
 @dataclass(frozen=True)
 class TorqueGainOfSigns(TorqueGain):
-    """Motors and brakes are calibrated apart; `factor` is the mean of both."""
+    """The factors in driving and in braking differ; `factor` is the mean."""
 
     form = "driving and braking unlike"
     equation = "T_true = (factor + apart) T in driving, (factor - apart) T in braking"
 
     apart: float = parameter(
         "-",
-        "half of what the factor in driving has more than that in braking",
+        "half of the difference, driving minus braking",
         neutral=0.0,
         low=-0.5,
         high=0.5,

@@ -12,7 +12,7 @@ from scenarios.effects.base import Array, Effect, parameter
 
 @dataclass(frozen=True)
 class TorqueLag(Effect):
-    """The torque follows its command with a first-order lag, settled on the first row's command before it."""
+    """The torque follows its command with a first-order lag; it starts at the command of the first row."""
 
     id = "torque_lag"
     form = "in one stage"
@@ -25,7 +25,7 @@ class TorqueLag(Effect):
 
     time_constant_s: float = parameter(
         "s",
-        "time until a step has come to 63 %",
+        "time to 63 % of a step",
         neutral=0.0,
         low=0.0,
         high=2.0,
@@ -49,7 +49,7 @@ class TorqueLag(Effect):
 
 @dataclass(frozen=True)
 class TorqueLagInTwoStages(TorqueLag):
-    """Two like lags behind each other, as of a current's control and a filter; the time constant is their sum."""
+    """Two equal lags in series, for example current control and filter; the time constant is their sum."""
 
     form = "in two stages"
     equation = "two lags of time_constant / 2 each"
@@ -62,14 +62,14 @@ class TorqueLagInTwoStages(TorqueLag):
 
 @dataclass(frozen=True)
 class TorqueLagOfRiseAndFall(TorqueLag):
-    """Pressure or boost that is built up more slowly than it is let go, or faster; `time_constant_s` is the mean."""
+    """Torque rises more slowly or faster than it falls; `time_constant_s` is the mean."""
 
     form = "rising and falling unlike"
     equation = "time_constant (1 + apart) where the torque grows, time_constant (1 - apart) where it falls"
 
     apart: float = parameter(
         "-",
-        "half of what the time constant of growing torque has more than that of falling, per mean",
+        "half of the difference, rising minus falling, over the mean",
         neutral=0.0,
         low=-0.8,
         high=0.8,

@@ -10,10 +10,9 @@ from scenarios.plant.parameters import DynamicsParameters
 
 @dataclass(frozen=True)
 class TyreFormula(Effect):
-    """A curve by the magic formula, of the same initial slope and peak as the simulation's on every road and load.
+    """A magic-formula curve with the same initial slope and peak as the simulation's tyre on every road and load.
 
-    It is structural, as `tyre_shape` is: that one bends the simulation's curve, this one is a curve of its own, which
-    on slippery roads no bending by one and the same factor comes near to.
+    Structural, like `tyre_shape`, which deforms the curve of the simulation instead of replacing it.
     """
 
     id = "tyre_formula"
@@ -25,12 +24,12 @@ class TyreFormula(Effect):
         "D the modified Dugoff tyre's greatest force, C shape, E curvature"
     )
     source = "Pacejka (2012), Tyre and Vehicle Dynamics, Eq. (4.49)"
-    excited_by = "slip near and beyond the force's maximum"
+    excited_by = "slip near and beyond the maximum of the force"
     confounders = ("friction_falloff", "friction_offset", "tyre_stiffness_offset")
 
     share: float = parameter(
         "-",
-        "how far the curve is from the simulation's to the formula's",
+        "0 is the curve of the simulation, 1 that of the formula",
         neutral=0.0,
         low=0.0,
         high=1.3,
@@ -38,7 +37,7 @@ class TyreFormula(Effect):
     )
     shape: float = parameter(
         "-",
-        "shape factor C: the greater, the lower the force where the tyre slides",
+        "shape factor C: a larger one gives less force in sliding",
         neutral=1.4,
         low=1.0,
         high=2.0,
@@ -46,7 +45,7 @@ class TyreFormula(Effect):
     )
     curvature: float = parameter(
         "-",
-        "curvature factor E: the greater, the later the maximum",
+        "curvature factor E: a larger one moves the maximum to more slip",
         neutral=0.0,
         low=-6.0,
         high=0.95,

@@ -10,7 +10,7 @@ from scenarios.plant.parameters import DynamicsParameters
 
 @dataclass(frozen=True)
 class TyreRelaxation(Effect):
-    """The tyre's force follows the slip only as the tyre rolls on."""
+    """The tyre force follows the slip with a lag over the distance rolled."""
 
     id = "tyre_relaxation"
     form = "the force lags"
@@ -18,12 +18,12 @@ class TyreRelaxation(Effect):
     subsystem = "tyre"
     equation = "F_x' = (V / length) (F_steady - F_x), V = max(omega R, v, 0.01 m/s)"
     source = "Pacejka (2012), Tire and Vehicle Dynamics, ch. 7, single-point contact patch model"
-    excited_by = "steps of torque at low speed: the lag is length / v"
+    excited_by = "steps of torque at low speed: the time lag is length / v"
     confounders = ("torque_lag", "torque_delay", "wheel_speed_delay", "driveline_compliance")
 
     length_m: float = parameter(
         "m",
-        "way rolled until a step of slip has built 63 % of its force",
+        "distance rolled to 63 % of the force after a step of slip",
         neutral=0.0,
         low=0.0,
         high=3.0,
@@ -37,7 +37,7 @@ class TyreRelaxation(Effect):
 
 @dataclass(frozen=True)
 class TyreRelaxationOfSlip(TyreRelaxation):
-    """The slip lags in place of the force: alike at small slip, sooner at its limit where the tyre slides."""
+    """The slip lags instead of the force: the same at small slip, a shorter lag in sliding."""
 
     form = "the slip lags"
     equation = "s' = (V / length) (slip - s), F_x = F_steady(s), V = max(omega R, v, 0.01 m/s)"
@@ -49,20 +49,20 @@ class TyreRelaxationOfSlip(TyreRelaxation):
 
 @dataclass(frozen=True)
 class TyreRelaxationWithLoad(TyreRelaxationOfSlip):
-    """The more load a tyre bears, the longer its contact and its relaxation; `length_m` is that at the mean load."""
+    """The relaxation length is proportional to the load; `length_m` is that at the mean load."""
 
     form = "longer with load"
     equation = "s' = V F_z0 / (length F_z) (slip - s), F_x = F_steady(s), F_z0 = m g / 4"
     source = "Pacejka (2012), Tire and Vehicle Dynamics, ch. 7, relaxation length and contact length"
 
     def dynamics(self, parameters: DynamicsParameters) -> DynamicsParameters:
-        """The lagging slip is later on the wheels that bear more."""
+        """The slip of wheels with more load lags more."""
         return super().dynamics(parameters)._replace(relaxation_by_load=1.0)
 
 
 @dataclass(frozen=True)
 class TyreRelaxationWhileItAdheres(TyreRelaxationOfSlip):
-    """Only what adheres has to be deformed: the nearer the tyre is to sliding, the sooner its force follows."""
+    """The relaxation length falls with the slope of the force over slip."""
 
     form = "shorter as the tyre slides"
     equation = "s' = V / max(length F'(s) / F'(0), 0.1 length) (slip - s), F_x = F(s), F the steady force"
@@ -75,7 +75,7 @@ class TyreRelaxationWhileItAdheres(TyreRelaxationOfSlip):
 
 @dataclass(frozen=True)
 class TyreRelaxationOfAxles(TyreRelaxationOfSlip):
-    """The tyres of the two axles differ, as where their sizes or pressures do; `length_m` is the mean."""
+    """The tyres of the two axles differ; `length_m` is the mean."""
 
     form = "axles unlike"
     equation = "s' = V / L (slip - s), F_x = F_steady(s), L = length (1 +- unlike), + in front"
@@ -85,7 +85,7 @@ class TyreRelaxationOfAxles(TyreRelaxationOfSlip):
 
 @dataclass(frozen=True)
 class TyreRelaxationOfWheels(TyreRelaxationOfAxles):
-    """Each tyre has its own wear and pressure, and so its own length; `length_m` is the mean."""
+    """Each tyre has its own length; `length_m` is the mean."""
 
     form = "each wheel its own"
     of_wheels = True

@@ -10,9 +10,9 @@ from scenarios.plant.parameters import DynamicsParameters
 
 @dataclass(frozen=True)
 class TyreShape(Effect):
-    """Another curve of force over slip with the same initial slope: what any tyre formula is to another.
+    """A smooth deviation of the curve of force over slip, with the same initial slope.
 
-    It is structural: the diagnosis allows for it beside an effect, and blames it for nothing.
+    It is structural: a difference between tyre models that a diagnosis never names as a cause.
     """
 
     id = "tyre_shape"
@@ -24,12 +24,12 @@ class TyreShape(Effect):
         "x = C_x lambda / (theta F_z), b(u) = 4 u^2 / (1 + u^2)^2"
     )
     source = "own: smooth deviations, as between the formulas in Pacejka (2012), Tyre and Vehicle Dynamics"
-    excited_by = "slip near and beyond the force's maximum"
+    excited_by = "slip near and beyond the maximum of the force"
     confounders = ("friction_falloff", "friction_offset", "tyre_stiffness_offset")
 
     knee: float = parameter(
         "-",
-        "by how much the force is off where adhesion begins to give way to sliding",
+        "relative deviation of the force where sliding begins",
         neutral=0.0,
         low=-0.35,
         high=0.35,
@@ -37,7 +37,7 @@ class TyreShape(Effect):
     )
     crest: float = parameter(
         "-",
-        "by how much the force is off near its maximum",
+        "relative deviation of the force near its maximum",
         neutral=0.0,
         low=-0.35,
         high=0.35,
@@ -45,7 +45,7 @@ class TyreShape(Effect):
     )
     sliding: float = parameter(
         "-",
-        "by how much the force is off where the tyre slides all over",
+        "relative deviation of the force in full sliding",
         neutral=0.0,
         low=-0.35,
         high=0.35,

@@ -17,7 +17,7 @@ from trpac_core.vehicle import Vehicle
 
 @dataclass(frozen=True)
 class TyreStiffnessOffset(Effect):
-    """All tyres are stiffer or softer along the road than the vehicle file says."""
+    """The longitudinal stiffness of all tyres differs from the vehicle file."""
 
     id = "tyre_stiffness_offset"
     form = "all wheels alike"
@@ -25,7 +25,7 @@ class TyreStiffnessOffset(Effect):
     subsystem = "tyre"
     equation = "F_x(lambda) with the true C_x"
     source = "Bian et al. (2014), SAE 2014-01-0123"
-    excited_by = "strong torque below the grip limit: slip per force"
+    excited_by = "strong torque below the friction limit: slip over force"
     confounders = ("friction_offset", "wheel_radius_offset", "vehicle_speed_scale", "load_transfer")
 
     stiffness_n: float = parameter(
@@ -44,7 +44,7 @@ class TyreStiffnessOffset(Effect):
 
 @dataclass(frozen=True)
 class TyreStiffnessOffsetOfAxles(TyreStiffnessOffset):
-    """The tyres of the two axles differ, as where stiffness goes with the load; `stiffness_n` is the mean."""
+    """The tyres of the two axles differ; `stiffness_n` is the mean."""
 
     form = "axles unlike"
     equation = "C_x (1 + unlike) in front, C_x (1 - unlike) in the rear"
@@ -54,7 +54,7 @@ class TyreStiffnessOffsetOfAxles(TyreStiffnessOffset):
 
 @dataclass(frozen=True)
 class TyreStiffnessOffsetOfWheels(TyreStiffnessOffsetOfAxles):
-    """Each tyre has its own make, wear and pressure; `stiffness_n` is the mean."""
+    """Each tyre has its own stiffness; `stiffness_n` is the mean."""
 
     form = "each wheel its own"
     of_wheels = True
@@ -72,7 +72,7 @@ class TyreStiffnessOffsetOfWheels(TyreStiffnessOffsetOfAxles):
 
 @dataclass(frozen=True)
 class TyreStiffnessOffsetWithLoad(TyreStiffnessOffset):
-    """Stiffness grows with the load, from wheel to wheel and as load shifts; `stiffness_n` is that at the mean load."""
+    """The stiffness grows with the wheel load; `stiffness_n` is that at the mean load."""
 
     form = "with load"
     equation = "C_x (1 + by_load (F_z / F_z0 - 1)), F_z0 = m g / 4"
@@ -80,7 +80,7 @@ class TyreStiffnessOffsetWithLoad(TyreStiffnessOffset):
 
     by_load: float = parameter(
         "-",
-        "share of the stiffness that goes with the load: 1 in proportion",
+        "share of the stiffness that grows with load; 1 is proportional",
         neutral=0.0,
         low=-0.5,
         high=1.5,

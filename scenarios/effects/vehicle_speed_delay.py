@@ -10,14 +10,14 @@ from scenarios.effects.shifting import advanced, delayed
 
 @dataclass(frozen=True)
 class VehicleSpeedDelay(Effect):
-    """The ground speed is reported late; before that its first value holds."""
+    """The speed over ground is reported late; before that its first value holds."""
 
     id = "vehicle_speed_delay"
     stage = "sensors"
     subsystem = "vehicle_speed_sensor"
     equation = "v_read(t) = v(t - delay), linear between the rows"
     source = "definition"
-    excited_by = "strong changes of acceleration: speed against accelerometer and wheels"
+    excited_by = "strong changes of acceleration: speed compared with accelerometer and wheels"
     confounders = ("wheel_speed_delay", "torque_delay", "tyre_relaxation")
 
     delay_s: float = parameter(

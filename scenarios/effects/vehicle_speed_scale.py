@@ -9,19 +9,19 @@ from scenarios.effects.base import Array, Effect, Signals, parameter
 
 @dataclass(frozen=True)
 class VehicleSpeedScale(Effect):
-    """The ground-speed sensor reads too much or too little, always by the same factor."""
+    """The sensor of the speed over ground reads the true speed times one factor."""
 
     id = "vehicle_speed_scale"
     stage = "sensors"
     subsystem = "vehicle_speed_sensor"
     equation = "v_read = factor v"
     source = "definition"
-    excited_by = "free rolling at any speed, and position against speed"
+    excited_by = "free rolling at any speed; position compared with speed"
     confounders = ("wheel_radius_offset", "tyre_stiffness_offset")
 
     factor: float = parameter(
         "-",
-        "speed as read per true speed",
+        "reading over true speed",
         neutral=1.0,
         low=0.5,
         high=1.5,

@@ -10,7 +10,7 @@ from scenarios.plant.parameters import DynamicsParameters
 
 @dataclass(frozen=True)
 class WheelInertiaOffset(Effect):
-    """Wheel and motor are harder or easier to spin up than the vehicle file says."""
+    """The inertia of wheel and motor differs from the vehicle file."""
 
     id = "wheel_inertia_offset"
     form = "all wheels alike"
@@ -18,7 +18,7 @@ class WheelInertiaOffset(Effect):
     subsystem = "wheel"
     equation = "I omega' = T - F_x R with the true I"
     source = "Eq. (12) of Tian et al. 2022, doi:10.3390/rs14215583"
-    excited_by = "quick changes of wheel speed: spinning up and locking wheels on a slippery road"
+    excited_by = "fast changes of wheel speed: spinning and locking wheels on a slippery road"
     confounders = ("mass_offset", "torque_gain", "torque_lag", "driveline_compliance")
 
     inertia_kg_m2: float = parameter(

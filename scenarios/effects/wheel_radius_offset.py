@@ -17,7 +17,7 @@ from trpac_core.vehicle import Vehicle
 
 @dataclass(frozen=True)
 class WheelRadiusOffset(Effect):
-    """The true rolling radius of all wheels differs from the vehicle file's: wear, pressure, other tyres."""
+    """The rolling radius of all wheels differs from the vehicle file, by wear, pressure or other tyres."""
 
     id = "wheel_radius_offset"
     form = "all wheels alike"
@@ -25,7 +25,7 @@ class WheelRadiusOffset(Effect):
     subsystem = "wheel"
     equation = "rim speed omega R and moment F_x R with the true R"
     source = "Pacejka (2012), Tire and Vehicle Dynamics, ch. 1, effective rolling radius"
-    excited_by = "free rolling: v per omega at torque zero"
+    excited_by = "free rolling: v over omega at zero torque"
     confounders = ("vehicle_speed_scale", "tyre_stiffness_offset", "mass_offset", "torque_gain")
 
     radius_m: float = parameter(
@@ -46,7 +46,7 @@ class WheelRadiusOffset(Effect):
 
 @dataclass(frozen=True)
 class WheelRadiusOffsetRolling(WheelRadiusOffset):
-    """What the wheel rolls per turn is off, the height of its axle is not: a belt that stretches or creeps."""
+    """The rolling radius differs, the lever arm of the force does not."""
 
     form = "rolling alone"
     equation = "rim speed omega R with the true R, moment F_x R with the nominal one"
@@ -69,7 +69,7 @@ class WheelRadiusOffsetOfAxles(WheelRadiusOffset):
 
 @dataclass(frozen=True)
 class WheelRadiusOffsetOfWheels(WheelRadiusOffsetOfAxles):
-    """Each tyre has its own wear and pressure; `radius_m` is the mean."""
+    """Each tyre has its own radius; `radius_m` is the mean."""
 
     form = "each wheel its own"
     of_wheels = True

@@ -17,7 +17,7 @@ class WheelSpeedDelay(Effect):
     subsystem = "wheel_speed_sensor"
     equation = "omega_read(t) = omega(t - delay), linear between the rows"
     source = "definition"
-    excited_by = "strong changes of torque: wheel speeds against speed and accelerometer"
+    excited_by = "strong changes of torque: wheel speeds compared with speed and accelerometer"
     confounders = ("torque_delay", "vehicle_speed_delay", "wheel_speed_quantisation", "tyre_relaxation")
 
     delay_s: float = parameter(

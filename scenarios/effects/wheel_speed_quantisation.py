@@ -15,9 +15,9 @@ MOST_TEETH = 20_000.0
 
 @dataclass(frozen=True)
 class WheelSpeedQuantisation(Effect):
-    """Pulses are counted over consecutive windows, and each count is reported through the next window.
+    """Pulses are counted over consecutive windows; each count is reported during the next window.
 
-    Windows and pulses begin with the first row; before it the wheels are taken to have turned at the first row's speed.
+    Windows and pulses begin with the first row; before it the wheels have the speed of the first row.
     """
 
     id = "wheel_speed_quantisation"
@@ -25,14 +25,19 @@ class WheelSpeedQuantisation(Effect):
     subsystem = "wheel_speed_sensor"
     equation = "omega_read = 2 pi counts / (teeth window), counts of the last full window"
     source = "Kiencke and Nielsen (2005), Automotive Control Systems; pulse counting as with a toothed ring"
-    excited_by = "any driving: steps of 2 pi / (teeth window), late by one window on average"
+    excited_by = "any driving: steps of 2 pi / (teeth window), one window late on average"
     confounders = ("wheel_speed_delay",)
 
     teeth: float = parameter(
         "-", "pulses per revolution", neutral=48.0, low=1.0, high=MOST_TEETH, starts=(48.0, 100.0)
     )
     window_s: float = parameter(
-        "s", "counting time; 0 is an ideal sensor", neutral=0.0, low=0.0, high=0.5, starts=(0.01, 0.02, 0.05)
+        "s",
+        "length of a window; 0 is an ideal sensor",
+        neutral=0.0,
+        low=0.0,
+        high=0.5,
+        starts=(0.01, 0.02, 0.05),
     )
 
     def sense(self, time_s: Array, signals: Signals) -> Signals:

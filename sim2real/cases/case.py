@@ -1,4 +1,4 @@
-"""A case: a car as published, windows of its logs, and the steps by which its simulation was mended."""
+"""A case: a car as published, windows of its logs, and the steps by which its simulation was improved."""
 
 from __future__ import annotations
 

@@ -103,8 +103,8 @@ class Stack:
 
     def blocks(self, model: Simulation) -> Array:
         """What a model leaves, shape (n, 7); of the logs without the fault what the car as simulated leaves."""
-        suspected = self.logs[: len(self.logs) - self.faultless]
-        found = [block_means(noise.whitened(_rest(model, drive)), drive) for drive, noise in suspected]
+        with_fault = self.logs[: len(self.logs) - self.faultless]
+        found = [block_means(noise.whitened(_rest(model, drive)), drive) for drive, noise in with_fault]
         rows = sum(len(part) for part in found)
         return np.concatenate([*found, self.z[rows:]])
 

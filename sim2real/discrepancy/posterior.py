@@ -32,9 +32,9 @@ LEAST_SIZE = 0.25
 """An effect that is smaller is none [noticeable changes]."""
 PRICE = 2.0
 """Price of a parameter, as Akaike's [-]."""
-BLAMED = 30.0
-"""Drop of the cost from which on an effect is blamed: on cars without a fault wrong ones reach 27, with faults outside
-the library too; effects that are there and show have 37 and more, most above 100 [-]."""
+LEAST_DROP = 30.0
+"""Least drop of the cost with which an effect is named: on cars without a fault, and with faults outside the library,
+wrong ones reach 27; true effects that are excited have 37 and more, most above 100 [-]."""
 LIKE, LIKE_SHARE = 8.0, 0.08
 """Effects whose drops differ by less than this, or by this share of the best one, are not told apart [-]."""
 OUTSIDE = 6.0
@@ -139,7 +139,7 @@ def judge(
 ) -> Judged:
     """The verdict over single effects, pairs, and faults that no effect has the form of.
 
-    Pairs and other faults are asked for only where a single effect would be blamed.
+    Pairs and other faults are asked for only where a single effect would be named.
     """
     live = stack.z != 0.0
     first = {h.ids[0]: _account(stack, h, scale) for h in singles}
@@ -169,7 +169,7 @@ def judge(
         told = {stack.names[i]: float(values[i]) for i in order}
         return Judged(verdict, named, drops, probability, outside, told)
 
-    if top <= BLAMED:
+    if top <= LEAST_DROP:
         return said(Verdict.UNKNOWN, (), {}, null.build)
     two = sorted(
         ((null.cost - _account(stack, h, scale).cost, h) for h in fit_pairs()), key=lambda found: -found[0]
@@ -190,6 +190,8 @@ def judge(
         break
     if not _moves_so(stack, best[ranked[0]]):
         return said(Verdict.UNKNOWN, (), outside, null.build)
-    alike = [key for key in ranked if drops[key] > BLAMED and top - drops[key] < max(LIKE, LIKE_SHARE * top)]
+    alike = [
+        key for key in ranked if drops[key] > LEAST_DROP and top - drops[key] < max(LIKE, LIKE_SHARE * top)
+    ]
     verdict = Verdict.AMBIGUOUS if len(alike) > 1 else Verdict.PARTIAL
     return said(verdict, alike or ranked[:1], outside, best[ranked[0]].build)

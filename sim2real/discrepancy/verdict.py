@@ -45,7 +45,7 @@ def beside_another_build(
     jobs: int = 1,
     progress: Progress = silent,
 ) -> tuple[Contest, Decision]:
-    """Contest and decision with the car's build free; as they are where nothing is blamed then.
+    """Contest and decision with the car's build free; unchanged if no effect is named then.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def beside_another_build(
     fit_to, holdout : Evidence
         The logs.
     baseline : Evidence, optional
-        Logs of the same car without the suspected fault.
+        Logs of the same car without the fault.
     jobs, progress : int, callable
         Threads; told the stage and how much of how much is done.
     """

@@ -154,10 +154,10 @@ def trpac_error(
             f"mu_reference has shape {mu_reference.shape}; expected {drive.time_s.shape}, "
             f"a value per row of {drive.name}."
         )
-    simulation, mended = Simulation(vehicle), Simulation(vehicle, added)
-    model = mended.predict(drive)
-    noise_m_s = _sliding_speed_noise(mended, drive, model)
-    old, new = _inputs(simulation, drive), _inputs(mended, drive)
+    simulation, improved = Simulation(vehicle), Simulation(vehicle, added)
+    model = improved.predict(drive)
+    noise_m_s = _sliding_speed_noise(improved, drive, model)
+    old, new = _inputs(simulation, drive), _inputs(improved, drive)
     first = _run(old, drive, noise_m_s)
     second = first if new.same_as(old) else _run(new, drive, noise_m_s)
     truth = _truth(model, mu_reference)
@@ -171,7 +171,7 @@ def trpac_error(
         for run, mask in zip((first, second), rows, strict=True)
     )
     said = (_placed(simulation, added, drive), _judgement(own, drive.step_s))
-    return RmsError(before, after, _against(mended, mu_reference), " ".join(said))
+    return RmsError(before, after, _against(improved, mu_reference), " ".join(said))
 
 
 def places(effect: Effect, parameters: DynamicsParameters) -> tuple[str, ...]:
@@ -237,7 +237,7 @@ def _sliding_speed_noise(model: Simulation, drive: Drive, prediction: Prediction
 
 
 def _run(inputs: Inputs, drive: Drive, sliding_speed_noise_m_s: float) -> Run:
-    # What a model is worth shows where the estimator does not mend it by itself.
+    # What a model is worth shows where the estimator does not correct it by itself.
     config = EstimatorConfig(
         vehicle=inputs.vehicle,
         tolerance=EXACT_CAR,
@@ -304,12 +304,14 @@ def _judgement(own: Sequence[Mask], step_s: float) -> str:
     """Over how long the runs were judged, and what that means where one has nothing to be judged by."""
     lengths_s = [np.count_nonzero(mask) * step_s for mask in own]
     text = (
-        f"Judged over {lengths_s[0]:.1f} s before and {lengths_s[1]:.1f} s after, where the front left tyre shows "
-        "the road or the estimator takes it to."
+        f"Evaluated over {lengths_s[0]:.1f} s before and {lengths_s[1]:.1f} s after, in which the excitation of "
+        "the front left tyre suffices, by the reference or by the estimator."
     )
     for which, length_s in zip(("Before", "After"), lengths_s, strict=True):
         if length_s == 0.0:
-            text += f" {which}, it never does: its figure is what it goes on holding over the other's time."
+            text += (
+                f" {which}, it never suffices: that error is the one of the value that the estimator holds."
+            )
     return text
 
 
@@ -323,15 +325,15 @@ def _against(model: Simulation, mu_reference: Array | None) -> str:
 def _placed(simulation: Simulation, added: Sequence[Effect], drive: Drive) -> str:
     """A sentence per effect on its place in the estimator."""
     if not added:
-        return "Nothing was found to put into the estimator."
+        return "No effect was found that could be put into the estimator."
     parameters, _ = simulation.setup(drive.road)
     out = []
     for effect in added:
         found = places(effect, parameters)
         if found:
-            out.append(f"{effect.id} goes into {' and '.join(found)} of the estimator.")
+            out.append(f"{effect.id} changes {' and '.join(found)} of the estimator.")
         elif type(effect).road is not Effect.road:
-            out.append(f"{effect.id} changes the road, which the estimator finds out by itself.")
+            out.append(f"{effect.id} changes the road, which the estimator estimates itself.")
         else:
-            out.append(f"{effect.id} has no place in the estimator and leaves its estimate as it is.")
+            out.append(f"{effect.id} has no parameter in the estimator; its estimate does not change.")
     return " ".join(out)

@@ -1,1 +1,1 @@
-"""Which effect causes the gap: the contest of the candidates, what speaks against its winner, the verdict."""
+"""Which effect causes the gap: fits of the candidates, their goodness, the verdict."""

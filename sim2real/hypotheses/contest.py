@@ -31,10 +31,10 @@ COUNTER = "wheel_speed_quantisation"
 FINALISTS = 6
 """Effects that are fitted to all fit logs with full care, after a first round on one log."""
 NEAR = 0.2
-"""Share of the way from an effect's absence to its nearest start that a fit begins at, too [-]."""
+"""Share of the distance from an effect's absence to its nearest start, at which a fit begins too [-]."""
 FIRST_ROUND_STEPS = 4
 """Steps of the first round's fits."""
-TELLS_MORE = 3.0
+LARGER_LOSS = 3.0
 """The first round is held on the longest log, unless the model as it is leaves so many times its loss on another: the
 gap then lies there, and what the longest does not excite would never be fitted [-]."""
 
@@ -138,7 +138,7 @@ def first_round(
     progress: Progress = silent,
 ) -> list[Fit]:
     """Effects of motion and sensors, in forms of no more parameters than the first, fitted roughly to one log."""
-    one_log = _telling(model, fit_to)
+    one_log = _log_of_first_round(model, fit_to)
     candidates = [
         Candidate(model, (key,), (form,))
         for key, kinds in FORMS.items()
@@ -150,13 +150,13 @@ def first_round(
     return sorted(run_all(work, jobs, progress, "effects, first round"), key=lambda found: found.loss)
 
 
-def _telling(model: Simulation, fit_to: Evidence) -> Evidence:
+def _log_of_first_round(model: Simulation, fit_to: Evidence) -> Evidence:
     """The log that the first round is held on."""
     logs = fit_to.each()
     longest = max(range(len(logs)), key=lambda i: len(logs[i].drives[0]))
     losses = [loss(log.whitened(log.residuals(model))) for log in logs]
     most = int(np.argmax(losses))
-    return logs[most if losses[most] > TELLS_MORE * losses[longest] else longest]
+    return logs[most if losses[most] > LARGER_LOSS * losses[longest] else longest]
 
 
 def _near_and_far(candidate: Candidate) -> Array:

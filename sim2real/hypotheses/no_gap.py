@@ -13,7 +13,7 @@ NO_GAP_MISFIT = 1.4
 """Up to this misfit of the model as it is, what is left is noise [-]."""
 NO_GAP_GAIN = 0.03
 """As long as no effect takes more than this share off the loss [-]."""
-QUIET_MISFIT, QUIET_GAIN = 1.0, 0.12
+NOISE_MISFIT, NOISE_GAIN = 1.0, 0.12
 """And four times as much where the misfit is no more than noise alone gives: noise that was read too large, as of a
 signal that is held, or of sensors that are next to ideal, leaves room for small ages, and for air of another density
 [-]."""
@@ -33,7 +33,7 @@ def is_noise(contest: Contest, fit_to: Evidence, holdout: Evidence) -> bool:
     misfit = fitness(null, fit_to, holdout).misfit
     if misfit > NO_GAP_MISFIT or gross_share(null, fit_to, holdout) > GROSS_BLOCKS:
         return False
-    most = (QUIET_GAIN if misfit <= QUIET_MISFIT else NO_GAP_GAIN) + DRIFT_GAIN * _drifting(fit_to, holdout)
+    most = (NOISE_GAIN if misfit <= NOISE_MISFIT else NO_GAP_GAIN) + DRIFT_GAIN * _drifting(fit_to, holdout)
     return all(e.loss >= (1.0 - most) * null.loss for e in _not_negligible(contest))
 
 

@@ -34,7 +34,7 @@ RIVAL = 0.1
 """A pair with more than this share of the winner's probability is not told apart from it [-]."""
 RIVAL_ALONE = 0.005
 """The same of two effects that each explain the gap alone: their forms differ from nature's by more than that. On
-withheld cases those that are told apart rightly have a share of 1.4e-4 or less, look-alikes have 0.01 and more."""
+withheld cases those that are rightly separated have a share of 1.4e-4 or less, confounders have 0.01 and more."""
 SOFTNESS = 4.0
 """Tempering of the quasi-likelihood: evidence counts for less than noise alone would say [-]."""
 FORM = 3e-4

@@ -74,7 +74,7 @@ def missing_for_diagnosis(log: Understood) -> list[str]:
     """What a diagnosis lacks beyond what an estimate needs, in a few words each."""
     missing = []
     if POSITION not in log.signals or POSITION in log.derived:
-        missing.append("no measured position: only a road of one stretch can be used")
+        missing.append("usable on a road of one stretch, since no position is measured")
     for name, what in (("vehicle_speed_m_s", "speed"), ("wheel_torque_fl_nm", "torque")):
         values = log.signals.get(name)
         if values is not None and np.nanstd(values) == 0.0:

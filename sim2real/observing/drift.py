@@ -21,7 +21,7 @@ from sim2real.observing.observer import Simulation
 Array = NDArray[np.float64]
 
 DRIFT_S = (0.3, 1.0, 3.0)
-"""Correlation times that a drift is made up of: a flicker has all of them, a wandering zero the longest [s]."""
+"""Correlation times that a drift is made up of: flicker noise has all of them, a drifting zero the longest [s]."""
 LENGTHS_S = (0.2, 0.6, 2.0)
 """Blocks whose means tell them apart [s]."""
 MOST_DRIFT = 1.0

@@ -71,8 +71,8 @@ class Reading(StrEnum):
 
     HELD = "changes every"
     RUNNING = "counts over the last"
-    UNSEEN = "changes at any row, and counts over less than"
-    ROUNDED = "is rounded at any row, over a window that does not show; taken for"
+    UNSEEN = "changes at any row and counts over less than"
+    ROUNDED = "is rounded at every row; the window is not visible and assumed as"
 
 
 @dataclass(frozen=True)

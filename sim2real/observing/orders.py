@@ -1,8 +1,8 @@
 """What repeats with each turn of a wheel: tyres out of round, tone wheels off centre, torque that ripples.
 
-Over time such a swing has no frequency of its own and passes for noise. Over the wheel's angle it is a line in the
-spectrum: an order, so many swings per turn. No effect of the library has one. A hum of the electrics is the reverse, a
-line over time, and stays noise.
+Over time such an oscillation has no fixed frequency and looks like noise. Over the wheel's angle it is a line in the
+spectrum: an order, a number of oscillations per turn. No effect of the library has one. Electrical interference is a
+line over time and remains noise.
 
 References
 ----------
@@ -147,13 +147,14 @@ def characterise(order: Order, drives: Sequence[Drive], share: float) -> Unexpla
     place = np.minimum((turn * CURVE).astype(int), CURVE - 1)
     count = np.maximum(np.bincount(place, minlength=CURVE), 1)
     curve = np.bincount(place, weights=longest.swing[:, wheel], minlength=CURVE) / count
-    grows = "grows with the torque" if order.subsystem == "powertrain" else "does not follow the torque"
-    moves = "moves the car too" if order.moves_car else "is seen by the sensors alone"
+    grows = "grows with the torque" if order.subsystem == "powertrain" else "does not depend on the torque"
+    moves = "also moves the car" if order.moves_car else "is in the sensors only"
     size = np.sqrt(2.0 * sizes.max())
     often = "once" if order.per_turn == 1.0 else f"{order.per_turn:.4g} times"
     sentence = (
-        f"The wheels' speed swings {often} per turn of the wheel, by {size:.3g} rad/s; it {grows} and {moves}. "
-        f"Such a swing takes {100.0 * share:.0f} % of the misfit: look at the {order.subsystem.replace('_', ' ')}."
+        f"The wheel speed oscillates {often} per turn of the wheel, with an amplitude of {size:.3g} rad/s; the "
+        f"oscillation {grows} and {moves}. It explains {100.0 * share:.0f} % of the misfit: check the "
+        f"{order.subsystem.replace('_', ' ')}."
     )
     at = (np.arange(CURVE) + 0.5) / CURVE * 2.0 * np.pi / order.per_turn
     shape = f"repeats {often} per turn"

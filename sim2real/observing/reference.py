@@ -159,7 +159,7 @@ def way(drive: Drive) -> Array:
     known = np.isfinite(position)
     if not known.any():
         raise LogError(
-            f"{drive.name}: {CHANNELS[POSITION]} tells nothing, and rows are to be matched by position; expected a "
+            f"{drive.name}: {CHANNELS[POSITION]} has no values, and rows are to be matched by position; expected a "
             "position that counts from the same place in both logs. Match by time otherwise."
         )
     filled = np.interp(drive.time_s, drive.time_s[known], position[known])

@@ -153,8 +153,8 @@ class OwnModel:
                 found.append((from_s, at_s, begun))
             elif not found:
                 raise LogError(
-                    f"{log.path}: {', '.join(sorted(known))} tell nothing in the first {BEGIN_S:g} s, and your "
-                    "model begins with them; expected a log that begins with them, or values under `start`."
+                    f"{log.path}: {', '.join(sorted(known))} have no values in the first {BEGIN_S:g} s, and your "
+                    "model starts with them; expected a log that starts with them, or values under `start`."
                 )
         ends = [from_s for from_s, _, _ in found[1:]] + [np.inf]
         return tuple(

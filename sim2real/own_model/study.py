@@ -102,7 +102,7 @@ class Study:
             if (r.high - r.low) * float(np.linalg.norm(column)) < LEAST_SIGMA:
                 told.append(
                     f"{r.name} of your model changes these logs by less than their noise from {r.low:g} to {r.high:g}: "
-                    "it cannot be told, and cannot be ruled out."
+                    "it cannot be identified or ruled out."
                 )
             else:
                 seen.append((r.name, column / np.linalg.norm(column)))
@@ -112,8 +112,8 @@ class Study:
         alike = columns.T @ columns
         pairs = [(i, j) for i in range(len(names)) for j in range(i) if abs(alike[i, j]) >= ALIKE]
         told += [
-            f"{names[j]} and {names[i]} of your model act alike on these logs (correlation {alike[i, j]:.3f}): only "
-            "one of them, or a sum of both, can be told. Drive a manoeuvre in which they differ."
+            f"{names[j]} and {names[i]} of your model act alike on these logs (correlation {alike[i, j]:.3f}): "
+            "only one of them, or a sum of both, is identifiable. Drive a manoeuvre in which they differ."
             for i, j in pairs
         ]
         _, sizes, directions = np.linalg.svd(columns, full_matrices=False)
@@ -121,8 +121,8 @@ class Study:
             members = [i for i, share in enumerate(direction) if abs(share) > MEMBER]
             if size < WEAK and len(members) > 2:
                 told.append(
-                    f"{', '.join(names[i] for i in members)} of your model together do what none of these logs shows "
-                    f"(singular value {size:.2g}): not all of them can be told at once."
+                    f"{', '.join(names[i] for i in members)} of your model have a combination that these logs do "
+                    f"not excite (singular value {size:.2g}): they are not identifiable together."
                 )
         return tuple(told)
 
@@ -267,8 +267,10 @@ def _sentence(found: Sequence[OwnParameter], first: Effect | None, exact: float 
             "" if first is None else f" ({first.id} of the library: {100.0 * np.clip(taken, 0.0, 1.0):.0f} %)"
         )
         parts.append(
-            f"Of your model's own parameters {best.name} takes most: {100.0 * best.share:.0f} % of what is no noise"
-            f"{beside}, at {value.value:.4g} {value.unit} in place of {best.nominal:.4g}; run so, it leaves "
+            f"Of the parameters of your model {best.name} explains most: {100.0 * best.share:.0f} % of the misfit "
+            "beyond noise"
+            f"{beside}, at {value.value:.4g} {value.unit} in place of {best.nominal:.4g}; a run with it leaves a "
+            "gap of "
             f"{best.gap_after:.2f}."
         )
     return " ".join(parts)

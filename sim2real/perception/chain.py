@@ -116,15 +116,15 @@ class Chain:
     unexcited : dict
         Effect to the reason why these logs could not show it.
     next_step : str
-        What would tell its look-alikes apart.
+        A manoeuvre that separates confounders.
     unexplained : Oddity or None
         What no account explains.
     errs : Oddity or None
         What it shows that is a gap unless bad pictures make the classes err.
     noticed : float
         Rest in standard deviations up to which it is too small to matter, however little the signal scatters [-].
-    quiet : bool
-        Whether the hold-out shows no gap at all: what the fit logs happen to have is blamed on nothing.
+    no_gap : bool
+        Whether the hold-out shows no gap; no effect is then named for the fit logs either.
     asked : tuple of str
         Effects that would account for a signal that is not as usual as a whole, which no more of it would settle:
         where nothing is decisive they stand, as a question, with "as simulated" as their rival.
@@ -141,7 +141,7 @@ class Chain:
     unexplained: Oddity | None = None
     errs: Oddity | None = None
     noticed: float = 0.0
-    quiet: bool = False
+    no_gap: bool = False
     asked: tuple[str, ...] = ()
 
     @classmethod
@@ -151,9 +151,9 @@ class Chain:
         return cls(signal, observations, 0.0, nothing, (), unexcited=dict.fromkeys(effects, why))
 
     def best(self) -> Account:
-        """The account that stands: with more effects only where that is decisive or asked, none where all is quiet."""
+        """The account that stands: with more effects only where that is decisive or asked, none if `no_gap`."""
         best = self.nothing
-        if self.quiet:
+        if self.no_gap:
             return best
         for account in sorted(self.accounts, key=lambda a: (len(a.effects), -a.score)):
             margin = DECISIVE if len(account.effects) > len(best.effects) else 0.0

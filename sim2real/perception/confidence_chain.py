@@ -1,4 +1,4 @@
-"""The confidence's account: blur, exposure or both against the simulation as it is, with what speaks for them."""
+"""The confidence's account: blur, exposure or both against the simulation as it is, with the evidence."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ Array = NDArray[np.float64]
 
 SIGNAL = "image_confidence"
 CHOICES = (("motion_blur",), ("exposure_shift",), ("motion_blur", "exposure_shift"))
-NEXT_STEP = "Drive the same surface slowly and fast, with the pictures recorded."
+NEXT_STEP = "Drive the same surface at low and at high speed and record the pictures."
 RECORD = (
-    "Record the pictures (image_path): no drive without them tells a wrong exposure from a camera that is always as "
-    "unsure."
+    "Record the pictures (image_path): without them a wrong exposure cannot be separated from a camera whose "
+    "normal confidence is as low."
 )
 LEAST_SPEED_SPREAD_M_S = 1.5
 """Standard deviation of speed below which blur cannot show as a fall with speed [m/s]."""
@@ -45,7 +45,7 @@ FEWEST_BLOCKS = 8
 """With fewer blocks nothing is said of confidence."""
 NOTICED = 0.1
 """Change of the confidence's logarithm below which it is no gap, however steady the camera is otherwise [-]."""
-QUIET, BEYOND_DOUBT, AGAINST = 0.97, 6.0, -1.0
+SMALLER, BEYOND_DOUBT, AGAINST = 0.97, 6.0, -1.0
 """Share of the hold-out's gap that an effect has to get below, else it is none [-], unless all logs together speak for
 it by so much, and the hold-out not by more than a nat against it [nats]."""
 SLIGHT = 0.035
@@ -151,15 +151,15 @@ def confidence_chain(
         asked=("exposure_shift",) if _is_unusual(seen, plain) else (),
     )
     every = (*chain.accounts, *outside)
-    if len(unseen) >= FEWEST_BLOCKS and _is_quiet(chain.nothing, every):
-        chain = replace(chain, quiet=True)
+    if len(unseen) >= FEWEST_BLOCKS and _shows_no_gap(chain.nothing, every):
+        chain = replace(chain, no_gap=True)
     if any(rival is chain.nothing for rival in chain.rivals(chain.best())):
         chain = replace(chain, next_step=RECORD)
     stands = next(f for f in (plain, *fits) if f.effects == chain.best().effects)
     if stands.effects == ("motion_blur",) and np.subtract(*_slow_and_fast(stands, known)[1]) > -SLIGHT:
-        chain, stands = replace(chain, quiet=True), plain
+        chain, stands = replace(chain, no_gap=True), plain
     pattern = odd_pattern(seen.together.raised(-borders), stands, _restlessness(every_log, model, modelled))
-    needed = [a for a in outside if a.score > chain.best().score + DECISIVE and not chain.quiet]
+    needed = [a for a in outside if a.score > chain.best().score + DECISIVE and not chain.no_gap]
     if needed and not pattern:
         pattern = _of_no_effect(max(needed, key=lambda account: account.score))
     return replace(chain, unexplained=pattern)
@@ -195,9 +195,9 @@ def _is_unusual(seen: Seen, plain: ConfidenceFit) -> bool:
     return seen.light is None and level_of(seen.known, plain) > NORMAL_RANGE * USUAL_SPREAD
 
 
-def _is_quiet(nothing: Account, others: Sequence[Account]) -> bool:
+def _shows_no_gap(nothing: Account, others: Sequence[Account]) -> bool:
     """Whether no account makes the hold-out's gap smaller, nor has all logs together speak for it beyond doubt."""
-    if min((account.left() for account in others), default=0.0) <= QUIET * nothing.left():
+    if min((account.left() for account in others), default=0.0) <= SMALLER * nothing.left():
         return False
     best = max(others, key=lambda account: account.score, default=nothing)
     return best.score < BEYOND_DOUBT or best.gain_holdout < AGAINST
@@ -206,11 +206,11 @@ def _is_quiet(nothing: Account, others: Sequence[Account]) -> bool:
 def _of_no_effect(needed: Account) -> Oddity:
     """What the confidence does that no effect of the library has it do."""
     blurred = "motion_blur" in needed.effects
-    what = "how the confidence goes with speed" if blurred else "how low the confidence is"
+    what = "how the confidence depends on speed" if blurred else "how low the confidence is"
     told = f"No effect of the library explains {what}. {needed.evidence_for[0]}"
     if blurred:
-        return Oddity(SIGNAL, told, "speed", "less where fast", "falls with it")
-    return Oddity(SIGNAL, told, "nothing that was measured", "less", "alike at all speeds")
+        return Oddity(SIGNAL, told, "speed", "less at high speed", "falls with it")
+    return Oddity(SIGNAL, told, "nothing that was measured", "less", "equal at all speeds")
 
 
 def _account(f: ConfidenceFit, nothing: ConfidenceFit, seen: Seen, model: ConfidenceModel) -> Account:
@@ -263,7 +263,8 @@ def _evidence(f: ConfidenceFit, seen: Seen) -> tuple[str, ...]:
         (slow, fast), losses = _slow_and_fast(f, blocks)
         low, high = np.exp(-losses)
         sentences.append(
-            f"Confidence goes from {low:.2f} at {slow:.0f} m/s to {high:.2f} at {fast:.0f} m/s, classes held apart."
+            f"Confidence changes from {low:.2f} at {slow:.0f} m/s to {high:.2f} at {fast:.0f} m/s, for each class "
+            "separately."
         )
     if "exposure_shift" in f.effects:
         if len(blocks):
@@ -273,7 +274,7 @@ def _evidence(f: ConfidenceFit, seen: Seen) -> tuple[str, ...]:
             )
         if np.isfinite(seen.signs.class_error):
             sentences.append(
-                f"The class is not road.yaml's in {100.0 * seen.signs.class_error:.0f} % of the results."
+                f"The class differs from road.yaml in {100.0 * seen.signs.class_error:.0f} % of the results."
             )
         if (light := seen.light) is not None:
             sentences.append(
@@ -294,11 +295,11 @@ def _doubts(f: ConfidenceFit, seen: Seen) -> tuple[str, ...]:
     doubts = []
     if f.effects:
         doubts.append(
-            "How strongly confidence answers is measured on the shipped networks; another chain's may differ by a "
-            "factor of two, to blur of seven, which the interval holds."
+            "The dependence of confidence was measured on image networks; that of another chain may differ by a "
+            "factor of two, for blur of seven, which the interval includes."
         )
     if "exposure_shift" in f.effects and seen.light is None:
-        doubts.append("The log names no pictures: over- and underexposure cannot be told apart.")
+        doubts.append("The log names no pictures: over- and underexposure cannot be separated.")
     return tuple(doubts)
 
 
@@ -327,11 +328,12 @@ def _unexcited(seen: Seen, choices: Sequence[tuple[str, ...]]) -> dict[str, str]
     spread = float(seen.known.speed_m_s.std()) if len(seen.known) else 0.0
     if spread < LEAST_SPEED_SPREAD_M_S:
         why["motion_blur"] = (
-            f"Speed varies by {spread:.1f} m/s only: confidence cannot show a fall with speed."
+            f"Speed varies by {spread:.1f} m/s only: a fall of confidence with speed cannot show."
         )
     if seen.light is None:
         why["exposure_shift"] = (
-            "Without pictures a moderate exposure error looks like another camera's normal confidence."
+            "Without pictures a moderate exposure error cannot be separated from the normal confidence of another "
+            "camera."
         )
     candidates = [effect for choice in choices for effect in choice]
     return {effect: text for effect, text in why.items() if effect in candidates}

@@ -74,9 +74,9 @@ def odd_confusion(results: Sequence[Results]) -> Oddity | None:
         if wrong.all() or sure[wrong].mean() > sure[~wrong].mean() - AS_SURE:
             other = Surface(int(np.bincount(classes[wrong]).argmax()))
             told = (
-                f"The camera is as sure as ever, but names another class in {100.0 * wrong.mean():.0f} % of its "
-                f"results where road.yaml has {true.label}, mostly {other.label}: does it take one surface for "
-                "another, or is road.yaml out of date?"
+                f"The camera reports another class with its usual confidence in {100.0 * wrong.mean():.0f} % of "
+                f"its results where road.yaml has {true.label}, mostly {other.label}. Check whether it confuses "
+                "the surfaces, or whether road.yaml is out of date."
             )
             return Oddity(SIGNAL, told, "surface", f"{other.label} for {true.label}", "whatever the picture")
     return None
@@ -117,7 +117,7 @@ def class_conflicts(results: Sequence[Results]) -> tuple[Conflict, ...]:
         if other is not None and inside.sum() >= FEWEST:
             share = (one.classes[inside] == other).mean()
             sentence = (
-                f"{one.log}: from {segment.start_m:g} m on the camera sees {other.label} in {100.0 * share:.0f} % "
+                f"{one.log}: from {segment.start_m:g} m on the camera reports {other.label} in {100.0 * share:.0f} % "
                 f"of its results where road.yaml has {segment.surface}."
             )
             found.append(Conflict(one.log, sentence))
@@ -132,8 +132,8 @@ def odd_conflicts(conflicts: Sequence[Conflict], results: Sequence[Results]) -> 
     if pdtrc(len(conflicts) - 1, _expected(results)) > CHANCE:
         return None
     told = (
-        f"The camera keeps seeing another class than road.yaml on {len(conflicts)} stretches in {len(logs)} logs: does "
-        f"it repeat old results, or take one surface for another? {conflicts[0].sentence}"
+        f"The camera reports another class than road.yaml throughout {len(conflicts)} stretches in {len(logs)} "
+        f"logs. Check whether it repeats old results or confuses surfaces. {conflicts[0].sentence}"
     )
     return Oddity(SIGNAL, told, "place", "another class", "for whole stretches")
 

@@ -232,8 +232,8 @@ def _unexplained(chain: Chain, account: Account) -> Oddity | None:
     if typical < max(least, chain.noticed):
         return None
     named = " and ".join(account.effects) or "the simulation as it is"
-    told = f"{chain.signal}: {named} leaves {typical:.1f} times the noise on the hold-out."
-    return Oddity(chain.signal, told, "nothing that was looked at", "both ways", "no pattern found")
+    told = f"{chain.signal}: with {named} {typical:.1f} times the noise remain on the hold-out."
+    return Oddity(chain.signal, told, "none of the checked quantities", "both ways", "no pattern found")
 
 
 def _measure(chains: Sequence[Chain], accounts: Sequence[Account]) -> Measure:
@@ -284,7 +284,7 @@ def _candidate(
     effects = tuple(effect for _, account in own for effect in account.effects)
     unseen = [chain.signal for chain, account in own if not len(account.z)]
     unknown = (
-        f"The hold-out has nothing of {' and '.join(unseen)}: by how much the gap shrinks there is not known."
+        f"The hold-out has no data of {' and '.join(unseen)}: the decrease of the gap there is not known."
     )
     nan = float("nan")
     return CameraCandidate(

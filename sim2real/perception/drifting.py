@@ -1,8 +1,8 @@
-"""Changes of class that lie beside the borders by a law that no effect of the library has.
+"""Changes of class beside the borders by a law that no effect of the library has.
 
-A wrong scale of position_m puts borders off by a share of the way since the log's begin, a clock that runs fast by the
-way driven in a delay that grows with time, stamps that are carried on at the last speed by what the car accelerates.
-Each law is a constant shift or delay and what it varies with, fitted and scored like the library's own.
+A wrong scale of position_m shifts borders by a share of the distance since the start of the log; a clock that runs fast
+by the distance driven in a delay that grows with time; stamps that are extrapolated with the last speed by the
+acceleration. Each law is a constant shift or delay and what it varies with, fitted and scored like the library's own.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ FEWEST = 6
 """Crossings on the fit logs from which on such a law is looked for."""
 CLEARLY, MOSTLY = 10.0, 1.5
 """By so much, and so many times, a varying shift must beat every effect of the library [nats], [-]: a mounting that
-settles, or a delay that wanders, is still an angle, or a delay, and takes most of it."""
+settles, or a delay that drifts, is still an angle, or a delay, and takes most of it."""
 LEAST_CHANGE_M = 0.7
 """Change of the shift over the crossings from which on it is a gap [m]."""
 GRID, ZOOMS = 17, 5
@@ -55,22 +55,22 @@ class Law:
 BY_WAY = Law(
     lambda c: (np.ones(len(c)), c.since_m),
     (5.0, 0.05),
-    "The changes of class lie beside road.yaml's borders by about {rate:+.1%} of the way since the log's begin: is the "
-    "scale of position_m wrong, or does it drift?",
-    "way since the log's begin",
+    "The changes of class differ from road.yaml's borders by about {rate:+.1%} of the distance since the start of "
+    "the log. Check whether the scale of position_m is wrong, or whether it drifts.",
+    "distance since the start of the log",
 )
 BY_TIME = Law(
     lambda c: (c.speed_m_s, c.speed_m_s * c.since_s),
     (1.0, 0.05),
-    "The changes of class come late by about {rate:+.2%} of the time since the log's begin: does the camera's clock "
-    "run at another rate than the logger's?",
-    "time since the log's begin",
+    "The changes of class are late by about {rate:+.2%} of the time since the start of the log. Check whether the "
+    "clocks of camera and logger run at the same rate.",
+    "time since the start of the log",
 )
 BY_PUSH = Law(
     lambda c: (np.ones(len(c)), c.accel_m_s2),
     (5.0, 2.0),
-    "The changes of class lie beside road.yaml's borders by about {rate:+.2f} m for each m/s² of acceleration: are the "
-    "stamps carried on at the last speed?",
+    "The changes of class differ from road.yaml's borders by about {rate:+.2f} m for each m/s² of acceleration. "
+    "Check whether the stamps are extrapolated with the last speed.",
     "acceleration",
 )
 

@@ -10,7 +10,7 @@ from sim2real.result import Interval, Measure, Place, Verdict
 
 @dataclass(frozen=True)
 class CameraCandidate:
-    """One or two effects of the camera chain and what speaks for them.
+    """One or two effects of the camera chain with their evidence.
 
     Attributes
     ----------

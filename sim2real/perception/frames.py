@@ -184,8 +184,8 @@ def of_one_camera(results: Sequence[Results]) -> tuple[list[Results], tuple[str,
     if ahead_m >= LEAST_AHEAD_M:
         return [replace(one, ahead_m=ahead_m) for one in results], ()
     told = (
-        f"The camera's stamps lie {ahead_m:.1f} m ahead of the lens; the pitch is reckoned for {USUAL_AHEAD_M:g} m "
-        "instead."
+        f"The camera's stamps lie {ahead_m:.1f} m ahead of the lens; the pitch is calculated for "
+        f"{USUAL_AHEAD_M:g} m instead."
     )
     return [replace(one, ahead_m=USUAL_AHEAD_M) for one in results], (told,)
 
@@ -229,7 +229,7 @@ def _one_row_per_result(log: Log) -> tuple[pd.DataFrame, list[str]]:
     if rows["id"].nunique() < STUCK_RESULTS:
         if rows[stamp].drop_duplicates().shape[0] > STUCK_RESULTS:
             why = "is missing" if rows["id"].isna().all() else "does not change"
-            warnings.append(f"{log.name}: frame_id {why}; a new stamp is taken for a new result.")
+            warnings.append(f"{log.name}: frame_id {why}; a new stamp is used as a new result.")
         rows["id"] = np.nan
     rows["picture"] = rows["picture"].replace("", None)
     rows = rows[rows["id"].notna() | rows[stamp].notna().all(axis=1)]

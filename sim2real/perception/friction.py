@@ -47,9 +47,7 @@ USUAL = np.array([CLASS_THETA[s] for s in Surface])
 CALIBRATION_ERROR = np.maximum(CALIBRATION * USUAL, TOLERANCE)
 """Standard deviation of what all stretches of a class are off together, in the order of `Surface` [-]."""
 SIGNAL, OFFSET = "mu_reference", "class_friction_offset"
-NEXT_STEP = (
-    "Brake to the limit on each surface: the tyres show the road's friction, and whose value is wrong."
-)
+NEXT_STEP = "Brake to the limit on each surface: the tyres then show the friction of the road and which value is wrong."
 NOTABLE, MOST_PLACES = 3.0, 4
 IN_DOUBT = 0.5 * DECISIVE
 """By so much the plain reading may change the class values more than another one before it is left [nats]."""
@@ -221,7 +219,7 @@ def friction_chain(
         places=_places(accounts[0], unseen),
         unexcited=_undriven(known),
         next_step=NEXT_STEP,
-        quiet=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0,
+        no_gap=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0,
     )
     late = odd_lateness(answer)
     if late:
@@ -268,8 +266,9 @@ def _evidence(fit: FrictionFit, nothing: FrictionFit, known: Stretches) -> tuple
                 f"road.yaml {np.median(known.simulated[here, 0]):.2f})"
             )
     return (
-        f"mu_reference over {len(known)} stretches: {', '.join(means)}. Nearest without a gap is {nothing.what}; "
-        f"{fit.what} leave{'s' if fit.size == 1 else ''} {np.sqrt(np.mean(fit.z(known) ** 2)):.1f} of its deviation.",
+        f"mu_reference over {len(known)} stretches: {', '.join(means)}. The closest prediction without an effect "
+        f"is {nothing.what}; {fit.what} leave{'s' if fit.size == 1 else ''} "
+        f"{np.sqrt(np.mean(fit.z(known) ** 2)):.1f} standard deviations.",
     )
 
 
@@ -295,4 +294,4 @@ def _undriven(known: Stretches) -> dict[str, str]:
     missing = [name for c, name in enumerate(CLASSES) if not (known.classes == c).any()]
     if not missing:
         return {}
-    return {OFFSET: f"No friction reference on {' or '.join(missing)}: the value of that class is open."}
+    return {OFFSET: f"No friction reference on {' or '.join(missing)}: the value of that class is not known."}

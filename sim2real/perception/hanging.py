@@ -43,8 +43,8 @@ def odd_hanging(rest_m: Array, crossings: Crossings, results: Sequence[Results])
     if bdtrc(far - 1, len(crossings), mistaken) > CHANCE:
         return None
     told = (
-        f"At {far} of {len(crossings)} borders the class changes late, by up to {rest_m.max():.0f} m, and at "
-        "the others on time: does the camera hand out old pictures now and then?"
+        f"At {far} of {len(crossings)} borders the class changes late, by up to {rest_m.max():.0f} m, and at the "
+        "others in time. Check whether the camera sometimes sends old pictures."
     )
     return Oddity("image_place", told, "time", "late", "now and then")
 

@@ -82,8 +82,8 @@ def odd_lateness(answer: Answer) -> Oddity | None:
     if not answer.is_late:
         return None
     told = (
-        f"mu_reference follows the road {answer.dead_s:.1f} s late: its levels change only then, which no filter does. "
-        "When is it worked out, and what time is it stamped with?"
+        f"mu_reference follows the road {answer.dead_s:.1f} s late: it does not react before, unlike a filter. "
+        "Check when it is calculated and which time stamp it gets."
     )
     return Oddity("mu_reference", told, "time", "late", "a dead time")
 

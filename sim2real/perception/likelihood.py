@@ -18,7 +18,7 @@ from sim2real.perception.crossings import Crossings
 Array = NDArray[np.float64]
 
 ERROR_M = 0.1
-"""Least scale of a crossing's error: borders are no lines, positions wander [m]."""
+"""Least scale of a crossing's error: borders are no lines, positions drift [m]."""
 SCALES = np.array([1.0, 1.5, 2.5, 4.0, 7.0, 12.0, 20.0, 40.0, 80.0])
 """Scales of the crossings' errors that are tried [-]."""
 SHARES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])

@@ -83,7 +83,8 @@ def _shaken(rest: Array, blocks: Blocks) -> Oddity | None:
         return None
     told = (
         f"The confidence falls with acceleration, by a factor of {np.exp(max(pulling, braking)):.1f} at {hard:.1f} "
-        f"m/s²; that is {100.0 * share:.0f} % of what it does beside speed and class: is the camera's bracket loose?"
+        f"m/s². This explains {100.0 * share:.0f} % of its variance beside speed and class. Check whether the "
+        "camera's bracket is loose."
     )
     return Oddity(SIGNAL, told, "acceleration", "less", "in proportion to its size")
 
@@ -99,10 +100,10 @@ def _unsure_when_slow(rest: Array, blocks: Blocks) -> Oddity | None:
     if share < SLOW_SHARE or falls_by < SLOW_BY:
         return None
     told = (
-        f"The confidence is less by a factor of {np.exp(falls_by):.1f} at {slow:.0f} m/s than at {fast:.0f} m/s, the "
-        "reverse of blur: what does the camera need the speed for?"
+        f"The confidence is lower by a factor of {np.exp(falls_by):.1f} at {slow:.0f} m/s than at {fast:.0f} m/s, "
+        "the reverse of blur. Check how the camera depends on speed."
     )
-    return Oddity(SIGNAL, told, "speed", "less where slow", "in proportion to it")
+    return Oddity(SIGNAL, told, "speed", "less at low speed", "in proportion to it")
 
 
 def _shunned(loss: Array, blocks: Blocks) -> Oddity | None:
@@ -119,8 +120,8 @@ def _shunned(loss: Array, blocks: Blocks) -> Oddity | None:
         return None
     names = {int(s): s.label for s in Surface}
     told = (
-        f"The confidence is {low:.2f} on {names[worst]} and {high:.2f} on {names[best]}, at one speed: what dazzles or "
-        "covers the camera there?"
+        f"The confidence is {low:.2f} on {names[worst]} and {high:.2f} on {names[best]}, at the same speed. Check "
+        "whether something dazzles or covers the camera there."
     )
     return Oddity(SIGNAL, told, "surface", f"less on {names[worst]}", "a level per surface")
 
@@ -140,7 +141,8 @@ def _creeping(rest: Array, blocks: Blocks) -> Oddity | None:
     way = "falls" if changes[0] > 0.0 else "rises"
     told = (
         f"The confidence {way} over every log, by a factor of "
-        f"{np.exp(np.median(np.abs(changes))):.1f}, at one speed and on one class: does the lens fog, or the light go?"
+        f"{np.exp(np.median(np.abs(changes))):.1f}, at the same speed and class. Check whether the lens fogs or "
+        "the light changes."
     )
     return Oddity(SIGNAL, told, "time", way, "steadily over every log")
 
@@ -149,7 +151,7 @@ def _restless(blocks: Blocks, deviation: float) -> Oddity | None:
     if not len(blocks) or deviation * np.exp(-blocks.loss.mean()) < RESTLESS:
         return None
     told = (
-        f"The confidence comes and goes by a factor of {np.exp(deviation):.1f} from second to second, on one "
-        "class at one speed: what stands in the camera's way at times, or shines into it?"
+        f"The confidence varies by a factor of {np.exp(deviation):.1f} from second to second, at the same speed "
+        "and class. Check whether something covers the lens or shines into it at times."
     )
-    return Oddity(SIGNAL, told, "time", "comes and goes", "from second to second")
+    return Oddity(SIGNAL, told, "time", "varies", "from second to second")

@@ -57,17 +57,15 @@ def odd_scatter(scale_m: float, rest_m: Array, crossings: Crossings, streak_m: f
     if scale_m < max(SCATTERED_M, OF_BRACKET * open_m):
         return None
     again, along = _passed_again(crossings), _neighbours(crossings)
-    lies = f"The changes of class lie about {scale_m:.1f} m beside road.yaml's borders, with no common shift or delay"
+    lies = f"The changes of class are {scale_m:.1f} m away from road.yaml's borders, without a common shift or delay"
     if _alike(rest_m, again) > AGAIN_ALIKE:
-        told = (
-            f"{lies}, the same each time that a border is passed: are the borders where road.yaml has them?"
-        )
-        return Oddity(SIGNAL, told, "place", BOTH_WAYS, "the same each time that a border is passed")
+        told = f"{lies}, but equal each time that a border is passed. Check the positions of the borders in road.yaml."
+        return Oddity(SIGNAL, told, "place", BOTH_WAYS, "equal each time that a border is passed")
     if _alike(rest_m, along) > NEIGHBOURS_ALIKE:
-        told = f"{lies}, and neighbours alike: does position_m drift, or does the delay?"
-        return Oddity(SIGNAL, told, "place or time", BOTH_WAYS, "alike at neighbouring borders")
+        told = f"{lies}, but similar at neighbouring borders. Check whether position_m or the delay drifts."
+        return Oddity(SIGNAL, told, "place or time", BOTH_WAYS, "similar at neighbouring borders")
     if len(again) < FEWEST_PAIRS and scale_m >= max(SCATTERED_ALONE_M, open_m, streak_m):
-        told = f"{lies}: are the borders where road.yaml has them, and does position_m drift?"
+        told = f"{lies}. Check the positions of the borders in road.yaml, and whether position_m drifts."
         return Oddity(SIGNAL, told, "place or time", BOTH_WAYS, "from border to border")
     return None
 

@@ -42,7 +42,7 @@ GRID, GRID_OF_TWO, ZOOMS = 41, 25, 3
 """Points per axis of the search over one parameter, and over two; how often it is drawn closer about what matters."""
 SIGNAL = "image_place"
 CHOICES = (("camera_latency",), ("camera_pitch",), ("camera_latency", "camera_pitch"))
-NEXT_STEP = "Pass the same borders once slowly and once fast, five times each at about 10 and 25 m/s."
+NEXT_STEP = "Pass the same borders at low and at high speed, five times each at about 10 and 25 m/s."
 SAME_SPEED_M_S = 2.0
 """Crossings within this range of speeds count as one speed [m/s]."""
 NOTABLE = 3.0
@@ -196,7 +196,7 @@ def shift_chain(
     choices = [c for c in CHOICES if not set(c) & set(exclude)]
     outside = [c for c in CHOICES if set(c) & set(exclude)]
     if not len(known):
-        why = "No border between two surfaces shows in the camera's classes on the fit logs."
+        why = "The camera's classes show no border between two surfaces on the fit logs."
         return Chain.silent(SIGNAL, pictures, [effect for choice in choices for effect in choice], why)
 
     def fit(effects: tuple[str, ...]) -> ShiftFit:
@@ -225,7 +225,7 @@ def shift_chain(
         places=_places(accounts[0], unseen),
         next_step=NEXT_STEP,
         errs=odd_hanging(closest.rest_m(every, height_m), every, seen),
-        quiet=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0 and not sure,
+        no_gap=len(unseen) >= FEWEST_UNSEEN and accounts[0].left() <= 1.0 and not sure,
     )
     drift = find_drift(known, unseen, plain.log_likelihood_of(every, height_m), best)
     if drift:
@@ -236,10 +236,10 @@ def shift_chain(
             accounts=tuple(rest),
             places=_places(nothing, unseen),
             unexplained=drift.odd,
-            quiet=False,
+            no_gap=False,
         )
     for choice, other in zip(outside, others, strict=True):
-        if other.score > chain.best().score + DECISIVE and not chain.quiet:
+        if other.score > chain.best().score + DECISIVE and not chain.no_gap:
             return replace(chain, unexplained=_another_law(chain.best(), choice))
     stands = chain.best()
     if stands.effects and stands.left() ** 2 - 1.0 <= MOSTLY * (accounts[0].left() ** 2 - 1.0):
@@ -256,10 +256,10 @@ def _leaves_its_stamp(f: ShiftFit, crossings: Crossings, height_m: float) -> boo
 
 def _another_law(best: Account, choice: tuple[str, ...]) -> Oddity:
     """What a shift is that goes with speed in a way that no effect of the library has."""
-    laws = {"camera_latency": "goes with speed", "camera_pitch": "does not depend on speed"}
+    laws = {"camera_latency": "is proportional to speed", "camera_pitch": "does not depend on speed"}
     law = " and partly ".join(laws[effect] for effect in choice)
-    blamed = " and ".join(best.effects) or "no effect of the library"
-    told = f"The changes of class are shifted along the road by what {law}, not as {blamed} would have it."
+    named = " and ".join(best.effects) or "no effect of the library"
+    told = f"The changes of class are shifted by a distance that {law}, which {named} does not explain."
     late = "camera_latency" in choice
     return Oddity(
         SIGNAL,

@@ -158,7 +158,7 @@ def _of_one(
         values = log.signals["mu_reference"][inside]
         # It may settle more slowly than all logs together say: what still moves in a stretch counts as its error.
         settled, newest = values[len(values) // 2 :], values[3 * len(values) // 4 :]
-        wander = float(settled.std() / np.sqrt(min(len(settled), 10)))
+        scatter = float(settled.std() / np.sqrt(min(len(settled), 10)))
         moving = abs(float(np.median(newest) - np.median(settled)))
         rows.append(
             (
@@ -167,7 +167,7 @@ def _of_one(
                 log.time_s[inside][-1],
                 int(segment.surface_class),
                 float(np.median(settled)),
-                float(np.hypot(TOLERANCE, np.hypot(wander, moving))),
+                float(np.hypot(TOLERANCE, np.hypot(scatter, moving))),
                 friction,
             )
         )

@@ -30,9 +30,9 @@ def odd_repeats(results: Sequence[Results]) -> Oddity | None:
     one, first, last = max(times, key=lambda t: t[0].time_s[t[2]] - t[0].time_s[t[1]])
     told = (
         f"The camera repeats a result to the last digit {len(times)} times, the longest in {one.log} from "
-        f"{one.time_s[first]:.2f} to {one.time_s[last]:.2f} s: does it freeze?"
+        f"{one.time_s[first]:.2f} to {one.time_s[last]:.2f} s. Check whether it freezes."
     )
-    return Oddity("image_confidence", told, "time", "the same to the last digit", "for a while, now and then")
+    return Oddity("image_confidence", told, "time", "the same to the last digit", "at times")
 
 
 def _repeats(one: Results) -> list[tuple[int, int]]:

@@ -69,7 +69,7 @@ class Findings:
     """Whether that is the whole gap."""
 
     def added(self) -> tuple[Effect, ...]:
-        """What the verdict blames, to be added to the model."""
+        """The effects that the verdict names, to be added to the model."""
         entry = self.decision.winner
         if entry.fit is None or self.decision.verdict is Verdict.UNKNOWN:
             return ()
@@ -91,11 +91,11 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
     heat: dict[str, dict[str, float]] = {}
     if decision.verdict is not Verdict.NO_GAP:
         progress("equations", 0, 1)
-        terms, unexplained, suspect = _terms(found, held, jobs)
+        terms, unexplained, isolated = _terms(found, held, jobs)
         progress("equations", 1, 1)
         if unexplained and decision.verdict is Verdict.UNKNOWN:
-            unexplained = _most_telling(found, unexplained, swing)
-            unexplained = unexplained if suspect else seen_alone(unexplained, gap.before)
+            unexplained = _larger(found, unexplained, swing)
+            unexplained = unexplained if isolated else seen_alone(unexplained, gap.before)
         missing = _missing(found, held, before)
         if not missing:
             likeliest = subsystem_of(terms[0]) if terms else ""
@@ -131,7 +131,7 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
 
 
 def _terms(found: Findings, held: Evidence, jobs: int) -> tuple[list[Term], Unexplained | None, bool]:
-    """Free terms, best first, what they say of a gap that no effect explains, and whether one sensor is suspected."""
+    """Free terms, best first, what they say of a gap that no effect explains, and whether one sensor is isolated."""
     decision = found.decision
     if decision.verdict is Verdict.PARTIAL:
         added = found.model.with_effects(*found.added())
@@ -146,17 +146,17 @@ def _terms(found: Findings, held: Evidence, jobs: int) -> tuple[list[Term], Unex
             False,
         )
     drives, noises = all_logs(found.fit_to, held)
-    suspect = lone_sensor(found.model, found.fit_to, held)
-    if suspect and "time" not in suspect.quantities:  # a sensor may fail for a while
-        suspect = replace(suspect, quantities=(*suspect.quantities, "time"))
-    terms = fit_terms(found.model, drives, noises, jobs, equations=(suspect,) if suspect else EQUATIONS)
+    isolated = lone_sensor(found.model, found.fit_to, held)
+    if isolated and "time" not in isolated.quantities:  # a sensor may fail for a while
+        isolated = replace(isolated, quantities=(*isolated.quantities, "time"))
+    terms = fit_terms(found.model, drives, noises, jobs, equations=(isolated,) if isolated else EQUATIONS)
     terms = with_refined(found.model, drives, noises, terms, jobs)
-    if not suspect:
+    if not isolated:
         terms = finer(found.model, drives[-1:], noises[-1:], terms, jobs)
-    return terms, characterise(terms, suspect), suspect is not None
+    return terms, characterise(terms, isolated), isolated is not None
 
 
-def _most_telling(found: Findings, term: Unexplained, swing: Unexplained | None) -> Unexplained:
+def _larger(found: Findings, term: Unexplained, swing: Unexplained | None) -> Unexplained:
     """Of a free term and what repeats with the wheels' angle: what takes most of the gap."""
     if swing and (found.only_order or swing.share > term.share):
         return swing
@@ -212,17 +212,22 @@ def _cause(
     shrunk = shrink(held, before, after, seed)
     pro, contra = [], []
     if shrunk.low > 0.0:
-        pro.append(f"Takes {shrunk.value:.0f} % off the gap of a log that it was not fitted to.")
+        pro.append(f"Reduces the gap on the hold-out, to which it was not fitted, by {shrunk.value:.0f} %.")
     if fit_ok.misfit <= 1.5:
-        pro.append("What it leaves averages out like noise.")
+        pro.append("The remaining residuals average out like noise.")
     else:
-        contra.append(f"Leaves {fit_ok.signals[worst]:.1f} times what noise averages to in {worst}.")
+        contra.append(
+            f"The remaining residuals of {worst} average to {fit_ok.signals[worst]:.1f} times what "
+            "noise gives."
+        )
     if not excited:
-        contra.append(f"Hardly excited: it shows when {EFFECTS[key].excited_by}; it cannot be ruled out.")
+        contra.append(
+            f"Hardly excited by these logs, so it cannot be ruled out. Excitation: {EFFECTS[key].excited_by}."
+        )
     for name in best.candidate.at_bound(best.x):
         contra.append(at_bound_in_words(name))
     if shrunk.high <= 1.0:
-        contra.append("Does not shrink the gap on the hold-out.")
+        contra.append("Does not reduce the gap on the hold-out.")
     return Cause(
         effect=key,
         probability=round(found.decision.probability.get(key, 0.0), 6),
@@ -246,7 +251,7 @@ def _stands(found: Findings) -> Entry:
 
 
 def _missing(found: Findings, held: Evidence, before: Sequence[Array]) -> dict[str, Sequence[Array]]:
-    """Subsystem to what the verdict leaves without its effects there; empty where it blames nothing."""
+    """Residuals per subsystem without the named effects in it; empty if no effect is named."""
     parts = dict.fromkeys(EFFECTS[effect.id].subsystem for effect in found.added())
     if len(parts) == 1:
         return dict.fromkeys(parts, before)

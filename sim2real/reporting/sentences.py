@@ -22,23 +22,24 @@ def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause]) -> str:
     """The verdict itself."""
     size = f"{gap.before.total:.1f} times the noise floor"
     if decision.verdict is Verdict.NO_GAP:
-        return "Simulation and logs agree down to the sensors' noise: nothing may be blamed."
+        return "Simulation and logs agree within the sensor noise: no effect is needed."
     if decision.verdict is Verdict.UNKNOWN:
         return f"There is a gap of {size}, and no effect of the library explains it."
     top = causes[0]
     digits = 1 if gap.before.total > 1.1 else 2
-    cut = f"it takes the gap from {gap.before.total:.{digits}f} to {gap.after.total:.{digits}f} times the noise floor"
+    before, after = (f"{side.total:.{digits}f}" for side in (gap.before, gap.after))
+    cut = f"the gap decreases from {before} to {after} times the noise floor"
     if decision.verdict is Verdict.COMPOUND:
-        return f"{' and '.join(decision.winner.ids)} are needed together: {cut.replace('it takes', 'they take')}."
+        return f"{' and '.join(decision.winner.ids)} are needed together: {cut}."
     if decision.verdict is Verdict.AMBIGUOUS:
-        return f"The gap of {size} is {top.effect}{_rivals(decision)}: these logs cannot tell which."
+        return f"The gap of {size} is explained by {top.effect}{_rivals(decision)}: these logs do not separate them."
     values = ", ".join(f"{name} {_number(v.value, v.unit)}" for name, v in top.parameters.items())
     if decision.verdict is Verdict.PARTIAL:
         return (
-            f"A part of the gap of {size} is {top.effect} ({values}): {cut}. What is left is a difference between the "
-            f"models that no effect has the form of{_build(decision)}."
+            f"A part of the gap of {size} is explained by {top.effect} ({values}): {cut}. The rest is a model "
+            f"difference that no effect describes{_build(decision)}."
         )
-    return f"The gap of {size} is {top.effect} ({values}): {cut}."
+    return f"The gap of {size} is explained by {top.effect} ({values}): {cut}."
 
 
 def _rivals(decision: Decision) -> str:
@@ -46,13 +47,13 @@ def _rivals(decision: Decision) -> str:
     key = decision.winner.name
     others = [e.name.replace("+", " with ") for e in decision.rivals if key not in e.ids]
     partners = [k for e in decision.rivals if key in e.ids for k in e.name.split("+") if k != key]
-    beside = f", perhaps not alone (with {_some(partners)})" if partners else ""
-    return (f" or as well {_some(others)}" if others else "") + beside
+    beside = f", possibly together with {_some(partners)}" if partners else ""
+    return (f" or equally by {_some(others)}" if others else "") + beside
 
 
 def _some(names: Sequence[str]) -> str:
     more = len(names) - SHOWN
-    return " or ".join([*names[:SHOWN], *([f"one of {more} more"] if more > 0 else [])])
+    return " or ".join([*names[:SHOWN], *([f"{more} others"] if more > 0 else [])])
 
 
 def _build(decision: Decision) -> str:
@@ -76,8 +77,9 @@ def nearest(decision: Decision, contest: Contest) -> str:
         for (_, p), value in zip(found.candidate.parameters, found.x, strict=True)
     )
     return (
-        f"Nearest comes {best.name.replace('+', ' with ')} ({values}): it takes {100.0 * share:.0f} % of the misfit, "
-        "and what it leaves or how says that it is not all, or not it."
+        f"The closest explanation is {best.name.replace('+', ' with ')} ({values}): it removes "
+        f"{100.0 * share:.0f} % of the misfit. It is not named as the cause, since what it leaves is not noise, or "
+        "another fault explains the gap better."
     )
 
 

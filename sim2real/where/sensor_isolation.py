@@ -29,7 +29,7 @@ CLEARED = 1.4
 
 
 def lone_sensor(model: Simulation, fit_to: Evidence, holdout: Evidence) -> Equation | None:
-    """The equation of the one sensor that everything else speaks against; None where there is none.
+    """The equation of the one sensor without which all other signals agree; None if there is none.
 
     Nor where all together are no more than noise: then leaving one out tells nothing.
     """

@@ -25,22 +25,25 @@ SENSOR_OF = {
 
 
 def characterise(
-    terms: Sequence[Term], suspect: Equation | None = None, of: str = "the misfit"
+    terms: Sequence[Term], isolated: Equation | None = None, of: str = "the misfit"
 ) -> Unexplained:
-    """The best term in the form of a result; `suspect` is a sensor that stands alone, `of` what it explains."""
+    """The best term as a result; `isolated` is the sensor without which all others agree."""
     best = terms[0]
     share = 1.0 - best.loss / max(best.null_loss, 1e-12)
     shape, sign = shape_of(best), sign_of(best)
     wanted = _wanted(best, sign, shape)
     subsystem = subsystem_of(best)
     sentence = (
-        f"The {subsystem.replace('_', ' ')}'s equation ({best.equation.key}) {wanted}. "
-        f"Such a term takes {100.0 * share:.0f} % of {of}."
+        f"The equation of the {subsystem.replace('_', ' ')} ({best.equation.key}) {wanted}. Such a term explains "
+        f"{100.0 * share:.0f} % of {of}."
     )
-    if suspect:
-        sentence = f"Without the {suspect.key.removesuffix(' sensor')}'s signal all else agrees. {sentence}"
+    if isolated:
+        name = isolated.key.removesuffix(" sensor")
+        sentence = f"Without the signal of the {name} all other signals agree. {sentence}"
     if best.equation.key == "axles":
-        sentence += " Another split of the torque does so, or tyres of one axle unlike the other's."
+        sentence += (
+            " Possible reasons: another torque split between the axles, or different tyres on the axles."
+        )
     return Unexplained(
         subsystem,
         best.equation.signal,
@@ -65,13 +68,13 @@ def _wanted(term: Term, sign: str, shape: str) -> str:
     on = f"{term.quantity} [{QUANTITIES[term.quantity][0]}]"
     if term.equation.key != TORQUE_GAIN:
         unit = "" if term.equation.unit == "-" else f" in {term.equation.unit}"
-        return f"wants a further term{unit} that depends on {on}: it {sign} and {shape}"
+        return f"needs an additional term{unit} that depends on {on}: it {sign} and {shape}"
     x, y = term.drawn
     if term.quantity not in TWO_SIDED:
-        return f"wants another share of the torque, which depends on {on}: {_span(x, y)}"
-    sides = {"where it drives": x > 0.0, "where it brakes": x < 0.0}
+        return f"needs a relative torque correction that depends on {on}: {_span(x, y)}"
+    sides = {"in driving": x > 0.0, "in braking": x < 0.0}
     spans = [f"{words} {_span(np.abs(x[side]), y[side])}" for words, side in sides.items() if side.any()]
-    return f"wants another share of the torque, which depends on {on}: {', '.join(spans)}"
+    return f"needs a relative torque correction that depends on {on}: {', '.join(spans)}"
 
 
 def _span(x: Array, y: Array) -> str:
@@ -94,8 +97,8 @@ def seen_alone(term: Unexplained, before: Measure) -> Unexplained:
         return term
     sensor = SENSOR_OF[signal]
     sentence = (
-        f"{signal} alone shows it ({before.signals[signal]:.1f} times the noise), and no term takes more than "
-        f"{100.0 * term.share:.0f} % of it: look at the {sensor.replace('_', ' ')}."
+        f"Only {signal} shows the gap ({before.signals[signal]:.1f} times the noise), and no term explains more "
+        f"than {100.0 * term.share:.0f} % of it: check the {sensor.replace('_', ' ')}."
     )
     return replace(term, subsystem=sensor, signal=signal, sentence=sentence)
 
@@ -114,14 +117,14 @@ def sign_of(term: Term) -> str:
 def shape_of(term: Term) -> str:
     """Shape of a curve, in words: the simplest of a few that comes within a tenth of it."""
     if term.quantity in PER_DRIVE:
-        return "comes and goes"
+        return "varies"
     x = term.x / max(float(np.abs(term.x).max()), 1e-12)
     spread = float(np.sqrt(np.mean(term.y**2)))
     forms = {
         "is constant": [np.ones_like(x)],
         "is proportional to it": [x],
         "grows with its square": [x * np.abs(x)],
-        "has one size with the quantity's sign": [np.sign(x)],
+        "has a constant size and the sign of the quantity": [np.sign(x)],
         "is a straight line": [np.ones_like(x), x],
         "is a parabola": [np.ones_like(x), x, x * x],
     }
@@ -130,4 +133,4 @@ def shape_of(term: Term) -> str:
         rest = term.y - design @ np.linalg.lstsq(design, term.y, rcond=None)[0]
         if np.sqrt(np.mean(rest**2)) < 0.1 * spread:
             return words
-    return "bends in its own way"
+    return "has no simple form"

@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,11 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom
-from training_folder import row, write_folder
+from training_folder import LowerHalf, row, write_folder
 
 from models.training import (
     augment,
     calibrate,
+    cards,
     data,
     keeping,
     outliers,
@@ -26,6 +28,7 @@ from models.training import (
     textures,
 )
 from models.training.__main__ import main
+from models.training.found_roads import with_found_roads
 from trpac_core.vision.networks import calibrated_probabilities
 
 ROOT = Path(__file__).parents[2]
@@ -381,15 +384,34 @@ def test_lacking_classes_are_named(tmp_path):
         assert part in str(failure.value)
 
 
-def test_unknown_source_is_refused_with_what_to_do(tmp_path):
-    folder = write_folder(
-        tmp_path, [row("mine/a.png", "train", "dry")], {"mine/a.png": np.zeros((9, 9, 3), np.uint8)}
-    )
-    (picture,) = data.read_manifest(folder)
-    with pytest.raises(data.DataFolderError, match="add one to ROAD_BOXES"):
-        patches.fixed_patches(picture)
+def test_of_pictures_of_ones_own_the_road_is_found_and_masks_are_for_the_segmenter_alone(tmp_path):
+    names = [f"mine/{label}_{split}.png" for label in data.LABELS for split in ("train", "val")]
+    rows = [row(n, n[:-4].rpartition("_")[2], n[5:-4].rpartition("_")[0], size=(320, 240)) for n in names]
+    shown = np.full((240, 320, 3), 90, np.uint8)
+    pictures = data.read_manifest(write_folder(tmp_path, rows, dict.fromkeys(names, shown)))
+    data.check_trainable(pictures, masks=False)
+    with pytest.raises(data.DataFolderError, match="--only surface needs none"):
+        data.check_trainable(pictures)
     with pytest.raises(data.DataFolderError, match="no road box is known for source 'mine'"):
-        data.check_trainable([picture])
+        patches.fixed_patches(pictures[0])
+    found = with_found_roads(pictures, LowerHalf())
+    assert all(road.mean() == 0.5 for road in (picture.road() for picture in found))
+    assert len(patches.judged_patches(found)) > 0
+    masked = replace(pictures[0], mask=tmp_path / "mask.png")
+    assert not masked.road_is_found
+
+
+def test_a_card_of_ones_own_pictures_says_nothing_of_the_packages(tmp_path, monkeypatch):
+    monkeypatch.setattr(cards, "PACKAGES", ())
+    told = []
+    for folder in ("mine", "condition_web/a"):
+        name = f"{folder}/a.png"
+        made = write_folder(
+            tmp_path / folder[0], [row(name, "train", "dry")], {name: np.zeros((9, 9, 3), np.uint8)}
+        )
+        facts = cards.RunFacts("", 1, data.read_manifest(made), {"train": 3}, {"train": "from 1"}, 1.0, 2)
+        told.append((facts.own, "other_cameras" in cards.splits_text(facts)))
+    assert told == [(True, False), (False, True)]
 
 
 def test_pictures_of_ones_own_need_no_share(tmp_path, monkeypatch):
@@ -406,7 +428,7 @@ def test_command_needs_the_training_extra_or_a_manifest(tmp_path, capsys):
     assert main(["--data", str(tmp_path)]) == 2
     told = capsys.readouterr().err
     if importlib.util.find_spec("torch") is None:
-        assert "requirements/train.txt" in told
+        assert "trpac-fmu[all,train]" in told
     else:
         assert "manifest.csv: not found" in told
 

@@ -128,16 +128,16 @@ class TestExcitation:
     @pytest.mark.parametrize(
         ("torque_of", "speed_m_s", "said"),
         [
-            (cruise, 20.0, "The fit logs hold only coasting and excite little"),
-            (braking, 40.0, "The fit logs hold only braking"),
-            (lambda duration_s: -braking(duration_s), 3.0, "The fit logs hold only driving"),
+            (cruise, 20.0, "The fit logs contain only coasting and have little excitation"),
+            (braking, 40.0, "The fit logs contain only braking"),
+            (lambda duration_s: -braking(duration_s), 3.0, "The fit logs contain only driving"),
         ],
         ids=["cruising", "braking", "accelerating"],
     )
     def test_one_manoeuvre_alone_is_said_with_what_to_record(self, sources, torque_of, speed_m_s, said):
         (told,) = require_adequate(sources(*three(torque_of, speed_m_s)))
         assert told.startswith(said)
-        assert "a verdict of no gap says little. Record 30 s or more" in told
+        assert "a verdict of no gap has little weight. Record 30 s or more" in told
         other = three()[1]
         assert require_adequate(sources(three(torque_of, speed_m_s)[0], other, three()[2])) == ()
 
@@ -157,7 +157,7 @@ class TestTorque:
             for seed in range(3)
         ]
         (told,) = require_adequate(sources(*coast))
-        assert "hold only coasting" in told
+        assert "contain only coasting" in told
 
     def test_of_the_wrong_sign_is_refused(self, sources):
         turned = lambda drive: torques(-drive.torque_nm[:, 0])  # noqa: E731
@@ -237,4 +237,4 @@ class TestInTheDiagnosis:
     def test_a_warning_is_in_the_diagnosis(self, sources):
         read = sources(*[noisy(clean(cruise(6.0), 20.0), seed) for seed in range(2)])
         said = diagnose_sources(read, exclude=set(EFFECTS) - {"mass_offset"})
-        assert any(text.startswith("The fit logs hold only coasting") for text in said.warnings)
+        assert any(text.startswith("The fit logs contain only coasting") for text in said.warnings)

@@ -17,12 +17,14 @@ from gap_files import write_log, write_road
 import sim2real
 from scenarios.effects import EFFECTS, FORMS
 from scenarios.errors import ScenarioError
+from scenarios.files import load_road, load_vehicle
 from sim2real.demo import VEHICLE
 from sim2real.diagnose import diagnose, diagnose_files, shrink_on
+from sim2real.logs import read_log
 from sim2real.observing.drive import CHANNELS, RECOVERY_S, WHEEL, backward, make_drive
 from sim2real.reporting.report import jsonable
 from sim2real.result import Diagnosis, Verdict
-from sim2real.sources import Given, read_source, read_sources, split
+from sim2real.sources import Given, make_source, put_together, read_source, read_sources, split
 from trpac_core.vehicle import WHEELS
 
 PAYLOAD = {"mass_offset": {"mass_kg": 180.0}}
@@ -412,7 +414,9 @@ def test_what_the_logger_wrote_before_the_sensors_woke_is_left_out_and_said(fold
         folder / "vehicle.yaml", folder / "dry.yaml", [f"{tmp_path}/waking.csv"], f"{folder}/holdout.csv"
     )
     assert found.fit[0].drive.time_s[0] == pytest.approx(1.0)
-    assert "the first 1 s are left out: nothing tells yet how fast the car is." in found.fit[0].log.warnings
+    assert (
+        "the first 1 s are left out: the speed of the car is not measured there." in found.fit[0].log.warnings
+    )
     assert not any("left out" in text for text in found.holdout.log.warnings)
 
 
@@ -443,7 +447,7 @@ def test_the_estimate_is_held_to_the_reference_of_its_own_rows_where_sensors_wak
 @pytest.mark.parametrize(
     ("speed_m_s", "known", "said"),
     [
-        (13.0, 200, r"in its last 1\.59 s alone; expected at least 2 s"),
+        (13.0, 200, r"in its last 1\.59 s only; expected at least 2 s"),
         (0.0, 200, "never moves forward on all wheels"),
     ],
 )
@@ -478,6 +482,24 @@ def test_a_hold_out_that_is_a_fit_log_is_said(folder):
     assert any("is a fit log, too" in text for text in same.holdout.log.warnings)
     other = read_sources(folder / "vehicle.yaml", folder / "dry.yaml", files[:1], files[1])
     assert not other.holdout.log.warnings
+
+
+def test_windows_of_one_log_may_be_fitted_to_and_held_out(folder):
+    """Regression: every window of the hold-out's file was called a fit log."""
+    vehicle, road = load_vehicle(folder / "vehicle.yaml"), load_road(folder / "dry.yaml")
+    log = read_log(folder / "fit_1.csv")
+    begin, end = log.time_s[[0, -1]]
+    middle = 0.5 * (begin + end)
+    early, late, across = log.window(begin, middle), log.window(middle, end), log.window(begin + 1.0, end)
+
+    def warnings(fit, holdout):
+        return put_together(
+            vehicle, None, [make_source(part, road) for part in (fit, holdout)]
+        ).holdout.log.warnings
+
+    assert not warnings(early, late)
+    assert not warnings(late, early)
+    assert any("is a fit log, too" in text for text in warnings(across, late))
 
 
 def test_wheels_that_turn_back_are_left_out_and_said(folder, tmp_path):

@@ -13,7 +13,7 @@ from scenarios.effects.mass_offset import MassOffset
 from scenarios.effects.torque_gain import TorqueGain
 from sim2real.diagnose import find
 from sim2real.hypotheses import selection
-from sim2real.hypotheses.contest import COUNTER, _telling, first_round, hold_contest
+from sim2real.hypotheses.contest import COUNTER, _log_of_first_round, first_round, hold_contest
 from sim2real.hypotheses.fitting import MOST_STARTS, Candidate, fit
 from sim2real.hypotheses.pairs import add_pairs
 from sim2real.hypotheses.selection import decide
@@ -87,9 +87,9 @@ def test_what_does_not_count_weighs_nothing(calm):
 
 def test_the_first_round_is_held_on_the_longest_log_unless_the_gap_lies_in_another():
     drives = [noisy(clean(pulses(t), 12.0)) for t in (3.0, 5.0, 4.0)]
-    assert _telling(MODEL, gather(MODEL, drives)).drives == (drives[1],)
+    assert _log_of_first_round(MODEL, gather(MODEL, drives)).drives == (drives[1],)
     heavy = noisy(clean(pulses(4.0), 12.0, effects={"mass_offset": {"mass_kg": 300.0}}))
-    assert _telling(MODEL, gather(MODEL, [*drives, heavy])).drives == (heavy,)
+    assert _log_of_first_round(MODEL, gather(MODEL, [*drives, heavy])).drives == (heavy,)
 
 
 def test_the_loss_is_a_square_for_noise_and_grows_with_the_size_of_outliers():

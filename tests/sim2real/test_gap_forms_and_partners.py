@@ -223,7 +223,7 @@ def test_an_unknown_sensor_fault_is_told_in_words():
     said = diagnose(MODEL, logs[:1], logs[1], exclude=only("mass_offset", "aero_drag"))
     assert said.verdict is Verdict.UNKNOWN
     assert said.unexplained.subsystem == "accelerometer"
-    assert "Without the accelerometer's signal all else agrees" in said.unexplained.sentence
+    assert "Without the signal of the accelerometer all other signals agree" in said.unexplained.sentence
     assert {place.subsystem for place in said.where} == {"accelerometer"}
 
 

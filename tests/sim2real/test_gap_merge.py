@@ -10,7 +10,7 @@ import pytest
 from report_page import require_report
 
 from scenarios.files import RoadFile, load_vehicle
-from sim2real.auxiliary import Side, camera_side, counter_side
+from sim2real.auxiliary import AuxiliaryVerdict, camera_verdict, counter_verdict
 from sim2real.demo import VEHICLE
 from sim2real.merge import merge
 from sim2real.observing.lattice import Lattice, Reading
@@ -41,7 +41,7 @@ def side_of(verdict, **more):
     before = QUIET if verdict is Verdict.NO_GAP else LOUD
     after = QUIET if named else before
     term = TERM if verdict is Verdict.UNKNOWN else None
-    return Side(
+    return AuxiliaryVerdict(
         verdict,
         named,
         causes,
@@ -137,7 +137,7 @@ def test_what_one_half_names_stands_where_the_other_is_unknown(main):
     assert "Something" not in camera.sentence
     car = merge(main_of(main), side_of(Verdict.UNKNOWN))
     assert [c.effect for c in needed(car)] == [c.effect for c in needed(main_of(main))]
-    assert "Beside it, Something unknown" in car.sentence
+    assert "In addition: Unknown cause" in car.sentence
     two = merge(main_of(Verdict.COMPOUND), side_of(Verdict.UNKNOWN))
     assert {c.effect for c in needed(two)} == set(two.together) == {"tyre_relaxation", "aero_drag"}
 
@@ -195,7 +195,7 @@ def test_the_sentence_tells_of_both():
         merge(main_of(Verdict.IDENTIFIED), side_of(Verdict.NO_GAP)).sentence
         == main_of(Verdict.IDENTIFIED).sentence
     )
-    assert "Something unknown" in merge(main_of(Verdict.NO_GAP), side_of(Verdict.UNKNOWN)).sentence
+    assert "Unknown cause" in merge(main_of(Verdict.NO_GAP), side_of(Verdict.UNKNOWN)).sentence
 
 
 def test_places_are_those_of_a_side_that_has_a_gap():
@@ -248,7 +248,7 @@ AFTER = Measure(1.0, {"wheel_speed": 1.1, "vehicle_speed": 1.0, "accel_x": 1.0})
 
 
 def test_a_counter_is_identified_with_its_teeth_and_window():
-    side = counter_side(LATTICE, BEFORE, AFTER, excluded=False)
+    side = counter_verdict(LATTICE, BEFORE, AFTER, excluded=False)
     assert side.verdict is Verdict.IDENTIFIED
     assert side.named == ("wheel_speed_quantisation",)
     (cause,) = side.causes
@@ -264,14 +264,14 @@ def test_a_counter_is_identified_with_its_teeth_and_window():
 
 def test_a_window_that_the_log_is_too_slow_for_may_be_shorter():
     slow = Lattice(TURN / (100 * 0.01), 0.01, 0.05, 0.01, Reading.UNSEEN)
-    (cause,) = counter_side(slow, BEFORE, AFTER, excluded=False).causes
+    (cause,) = counter_verdict(slow, BEFORE, AFTER, excluded=False).causes
     teeth, window = cause.parameters["teeth"], cause.parameters["window_s"]
     assert window.low < 0.005 < window.high
     assert teeth.low < 100.0 < 200.0 < teeth.high  # 200 teeth over 5 ms leave the same values
 
 
 def test_a_counter_that_was_left_out_of_the_library_is_unknown():
-    side = counter_side(LATTICE, BEFORE, AFTER, excluded=True)
+    side = counter_verdict(LATTICE, BEFORE, AFTER, excluded=True)
     assert side.verdict is Verdict.UNKNOWN
     assert side.causes == ()
     assert side.unexplained is not None
@@ -284,13 +284,13 @@ def test_a_counter_that_was_left_out_of_the_library_is_unknown():
 
 
 def test_a_counter_beside_another_effect_is_a_compound():
-    found = merge(main_of(Verdict.IDENTIFIED), counter_side(LATTICE, BEFORE, AFTER, excluded=False))
+    found = merge(main_of(Verdict.IDENTIFIED), counter_verdict(LATTICE, BEFORE, AFTER, excluded=False))
     assert found.verdict is Verdict.COMPOUND
     assert {c.effect for c in found.causes[:2]} == {"tyre_relaxation", "wheel_speed_quantisation"}
 
 
 def test_a_counter_alone_is_by_the_contract():
-    found = merge(main_of(Verdict.NO_GAP), counter_side(LATTICE, BEFORE, AFTER, excluded=False))
+    found = merge(main_of(Verdict.NO_GAP), counter_verdict(LATTICE, BEFORE, AFTER, excluded=False))
     written = json.dumps(jsonable(found.to_json()), allow_nan=False)
     (row,) = [c for c in json.loads(written)["causes"] if c["effect"] == "wheel_speed_quantisation"]
     assert row["probability"] > 0.9
@@ -346,7 +346,7 @@ def finding(verdict, *candidates, causes=(), **more):
 
 
 def test_a_cameras_candidates_become_causes():
-    side = camera_side(finding(Verdict.IDENTIFIED, LATE, BOTH, TILTED, causes=("camera_latency",)))
+    side = camera_verdict(finding(Verdict.IDENTIFIED, LATE, BOTH, TILTED, causes=("camera_latency",)))
     assert [c.effect for c in side.causes] == ["camera_latency", "camera_pitch"]
     late, tilted = side.causes
     assert late.probability > 0.7 > tilted.probability
@@ -362,11 +362,11 @@ def test_a_cameras_candidates_become_causes():
 def test_a_pair_that_does_not_stand_lends_its_second_effect_little():
     """As good as the one effect that stands, which it would have to beat by odds of twenty to one."""
     equal = replace(BOTH, score=LATE.score)
-    side = camera_side(finding(Verdict.IDENTIFIED, LATE, equal, causes=("camera_latency",)))
+    side = camera_verdict(finding(Verdict.IDENTIFIED, LATE, equal, causes=("camera_latency",)))
     late, tilted = side.causes
     assert late.probability > 20.0 * tilted.probability
     stands = replace(BOTH, score=LATE.score + 2.0 * DECISIVE)
-    both = camera_side(finding(Verdict.COMPOUND, stands, LATE, causes=BOTH.effects))
+    both = camera_verdict(finding(Verdict.COMPOUND, stands, LATE, causes=BOTH.effects))
     assert min(c.probability for c in both.causes) > 0.45
 
 
@@ -377,18 +377,18 @@ def test_what_its_own_signal_does_not_stand_by_is_less_probable_than_what_is_nam
     values = replace(candidate(("class_friction_offset",), 2.4), signal="mu_reference")
     asked = (("class_friction_offset",),)
     found = finding(Verdict.AMBIGUOUS, blur, bright, values, causes=asked[0], ambiguous_with=asked)
-    causes = camera_side(found).causes
+    causes = camera_verdict(found).causes
     assert [c.effect for c in causes] == ["class_friction_offset", "motion_blur", "exposure_shift"]
     assert causes[0].probability > 0.7
 
 
 def test_a_candidate_that_explains_no_more_than_nothing_is_not_probable():
-    side = camera_side(finding(Verdict.NO_GAP, candidate(("motion_blur",), -4.0)))
+    side = camera_verdict(finding(Verdict.NO_GAP, candidate(("motion_blur",), -4.0)))
     assert side.causes[0].probability < 0.05
 
 
 def test_what_the_camera_cannot_explain_is_told():
-    side = camera_side(finding(Verdict.UNKNOWN, TILTED, odd=(odd("Classes change in tunnels."),)))
+    side = camera_verdict(finding(Verdict.UNKNOWN, TILTED, odd=(odd("Classes change in tunnels."),)))
     assert side.unexplained is not None
     assert side.unexplained.sentence == "Classes change in tunnels."
     assert side.unexplained.subsystem == "camera"
@@ -398,7 +398,7 @@ def test_what_the_camera_cannot_explain_is_told():
         "late",
         "in tunnels",
     )
-    known = camera_side(
+    known = camera_verdict(
         finding(Verdict.IDENTIFIED, LATE, causes=("camera_latency",), odd=(odd("Beside it."),))
     )
     assert known.unexplained is None
@@ -407,12 +407,12 @@ def test_what_the_camera_cannot_explain_is_told():
 
 def test_an_estimate_stays_within_what_a_vehicle_file_takes():
     wide = candidate(("motion_blur",), 30.0, exposure_s=Interval(0.21, 0.1, 0.5, "s"))
-    side = camera_side(finding(Verdict.IDENTIFIED, wide, causes=("motion_blur",)))
+    side = camera_verdict(finding(Verdict.IDENTIFIED, wide, causes=("motion_blur",)))
     assert side.causes[0].parameters == {"exposure_s": Interval(0.2, 0.1, 0.2, "s")}
 
 
 def test_reasons_of_what_cannot_be_ruled_out_are_kept_by_effect():
-    side = camera_side(finding(Verdict.NO_GAP, LATE, cannot_rule_out={"motion_blur": "always slow"}))
+    side = camera_verdict(finding(Verdict.NO_GAP, LATE, cannot_rule_out={"motion_blur": "always slow"}))
     assert side.cannot_rule_out == ("motion_blur",)
 
 
@@ -424,11 +424,11 @@ def test_a_road_out_of_place_speaks_before_the_cars_equations(signal, first):
     )
     main = replace(main_of(Verdict.UNKNOWN), unexplained=term, sentence="More slip.")
     pictures = finding(Verdict.UNKNOWN, TILTED, odd=(odd("Odd pictures.", signal),))
-    both = merge(main, camera_side(pictures))
+    both = merge(main, camera_verdict(pictures))
     assert both.verdict is Verdict.UNKNOWN
     assert both.unexplained is not None
     assert both.unexplained.subsystem == first
-    assert both.sentence.startswith("Something unknown: Odd pictures." if first == "camera" else "More slip.")
+    assert both.sentence.startswith("Unknown cause: Odd pictures." if first == "camera" else "More slip.")
     assert "Odd pictures." in both.sentence
     assert "More slip." in both.sentence
 
@@ -440,7 +440,7 @@ def test_all_effects_of_a_compound_of_more_than_two_are_told():
     assert set(found.together) == {c.effect for c in needed(found)} == named
     assert found.to_json()["together"] == list(found.together)
     assert len(needed(main)) == 2
-    counter = merge(main, counter_side(LATTICE, BEFORE, AFTER, excluded=False))
+    counter = merge(main, counter_verdict(LATTICE, BEFORE, AFTER, excluded=False))
     four = merge(counter, side_of(Verdict.IDENTIFIED))
     assert set(four.together) == named | {"wheel_speed_quantisation"}
     assert len(needed(four)) == 4
@@ -468,7 +468,7 @@ def test_what_a_camera_cannot_tell_apart_comes_with_two_speeds_to_drive():
     found = replace(
         found, ambiguous_with=(("camera_latency", "camera_pitch"),), next_step="Drive 10 and 25 m/s."
     )
-    told = merge(main_of(Verdict.NO_GAP), camera_side(found, load_vehicle(VEHICLE), MADE_ROAD))
+    told = merge(main_of(Verdict.NO_GAP), camera_verdict(found, load_vehicle(VEHICLE), MADE_ROAD))
     profile = told.to_json()["next_manoeuvre"]
     assert profile["sentence"] == "Drive 10 and 25 m/s."
     assert profile["separates"] == ["camera_latency", "camera_pitch"]
@@ -488,7 +488,7 @@ ASKED = finding(
 
 
 def test_an_effect_that_may_as_well_be_none_is_asked_about():
-    told = merge(main_of(Verdict.NO_GAP), camera_side(ASKED, load_vehicle(VEHICLE), MADE_ROAD))
+    told = merge(main_of(Verdict.NO_GAP), camera_verdict(ASKED, load_vehicle(VEHICLE), MADE_ROAD))
     assert (told.verdict, told.causes[0].effect) == (Verdict.AMBIGUOUS, "exposure_shift")
     assert told.next_manoeuvre is None  # no drive tells
     assert told.sentence.endswith("Record the pictures.")
@@ -500,7 +500,7 @@ def test_an_effect_that_may_as_well_be_none_is_asked_about():
 )
 def test_beside_a_gap_of_the_car_a_question_is_a_warning(verdict):
     main = main_of(verdict)
-    told = merge(main, camera_side(ASKED))
+    told = merge(main, camera_verdict(ASKED))
     assert told.verdict is verdict
     assert told.causes[0].effect == main.causes[0].effect
     assert told.ambiguous_with == main.ambiguous_with
@@ -552,7 +552,7 @@ def test_the_heat_map_leaves_the_cameras_share_to_the_camera():
 
 def test_an_estimate_beyond_its_bound_is_told_in_the_sentence_as_in_the_file():
     wide = candidate(("motion_blur",), 30.0, exposure_s=Interval(0.25, 0.1, 0.5, "s"))
-    side = camera_side(finding(Verdict.IDENTIFIED, wide, causes=("motion_blur",)))
+    side = camera_verdict(finding(Verdict.IDENTIFIED, wide, causes=("motion_blur",)))
     assert "exposure_s 0.2 s" in side.sentence
     assert any("at its bound" in text for text in side.causes[0].evidence_against)
 
@@ -567,6 +567,6 @@ def test_class_values_are_told_apart_by_braking():
         ambiguous_with=(values,),
         next_step="Brake to the limit on each surface.",
     )
-    planned = camera_side(found, vehicle, MADE_ROAD).next_manoeuvre
+    planned = camera_verdict(found, vehicle, MADE_ROAD).next_manoeuvre
     assert planned.sentence.startswith("Brake to the limit")
     assert planned.wheel_torque_nm.min() < 0.5 * -planned.wheel_torque_nm.max()

@@ -28,7 +28,7 @@ from long import beyond
 from scenarios.perception import perceive
 from scenarios.plant.pipeline import simulate
 from scenarios.plant.sensors import make_log
-from sim2real.auxiliary import UNKNOWN_BELIEF, camera_side
+from sim2real.auxiliary import UNKNOWN_BELIEF, camera_verdict
 from sim2real.perception.diagnose import diagnose_perception
 from sim2real.result import Verdict
 
@@ -118,16 +118,17 @@ def test_an_unknown_finding_does_not_believe_in_its_best_effect():
     blamed = diagnose(Camera(delay_s=0.25), speeds=SLOW_AND_FAST)
     unknown = diagnose(Camera(delay_s=0.25), exclude=("camera_latency",), speeds=SLOW_AND_FAST)
     assert unknown.verdict is Verdict.UNKNOWN
-    assert sum(c.probability for c in camera_side(unknown).causes) <= UNKNOWN_BELIEF + 1e-9
-    assert camera_side(blamed).causes[0].probability > 0.8
+    assert sum(c.probability for c in camera_verdict(unknown).causes) <= UNKNOWN_BELIEF + 1e-9
+    assert camera_verdict(blamed).causes[0].probability > 0.8
 
 
 def test_a_blamed_effect_is_told_with_its_values_and_what_it_does():
-    told = camera_side(diagnose(Camera(delay_s=0.25), speeds=SLOW_AND_FAST)).sentence
+    told = camera_verdict(diagnose(Camera(delay_s=0.25), speeds=SLOW_AND_FAST)).sentence
     assert re.match(
-        r"with delay_s 0\.2\d+ s the camera's gap goes from \d+\.\d to 1\.\d times the noise floor\.", told
+        r"with delay_s 0\.2\d+ s the camera's gap decreases from \d+\.\d to 1\.\d times the noise floor\.",
+        told,
     )
-    assert camera_side(diagnose(Camera(), speeds=SLOW_AND_FAST)).sentence == ""
+    assert camera_verdict(diagnose(Camera(), speeds=SLOW_AND_FAST)).sentence == ""
 
 
 def plant_log(road_file, seed, **effects):

@@ -41,7 +41,7 @@ def told_by(share: float):
 @pytest.mark.parametrize("share", [0.012, -0.008])
 def test_an_odometer_with_a_wrong_scale_is_named(share):
     finding = diagnose(Camera(), 3, speeds=UP_AND_DOWN, damage=told_by(share))
-    assert says(finding, "is the scale of position_m wrong"), finding.unexplained
+    assert says(finding, "whether the scale of position_m is wrong"), finding.unexplained
     assert any(f"{share:+.1%}"[:4] in text for text in finding.unexplained), finding.unexplained
     assert finding.odd[0].signal == "image_place"
     assert finding.odd[0].sign == ("later" if share > 0.0 else "earlier")
@@ -54,7 +54,7 @@ def test_a_clock_that_runs_away_is_named():
         return changed(log, **{n: log.signals[n] + late_m for n in ("image_from_m", "image_to_m")})
 
     finding = diagnose(Camera(), 3, speeds=UP_AND_DOWN, damage=damage)
-    assert says(finding, "does the camera's clock"), finding.unexplained
+    assert says(finding, "whether the clocks of camera and logger"), finding.unexplained
 
 
 def test_stamps_that_are_carried_on_at_the_last_speed_are_named():
@@ -69,7 +69,7 @@ def test_stamps_that_are_carried_on_at_the_last_speed_are_named():
 
     speeds = (12.0, 12.0, 25.0, 25.0, 12.0, 20.0, 20.0, 10.0)
     finding = diagnose(Camera(), 3, speeds=speeds, damage=damage, spacing_m=25.0)
-    assert says(finding, "carried on at the last speed"), finding.unexplained
+    assert says(finding, "extrapolated with the last speed"), finding.unexplained
     assert any("-0.5" in text or "-0.4" in text for text in finding.unexplained), finding.unexplained
 
 
@@ -104,8 +104,8 @@ def test_the_rate_of_a_growing_shift_is_found():
     plain = float(likeliest(known.joined(unseen), np.zeros(32), shifted=False))
     found = find_drift(known, unseen, plain, 0.0)
     assert found is not None
-    assert "+1.0% of the way" in found.odd.sentence
-    assert (found.odd.depends_on, found.odd.sign) == ("way since the log's begin", "later")
+    assert "+1.0% of the distance" in found.odd.sentence
+    assert (found.odd.depends_on, found.odd.sign) == ("distance since the start of the log", "later")
     assert found.scale == 1.0
 
 

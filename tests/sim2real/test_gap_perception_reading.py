@@ -24,7 +24,7 @@ from long import beyond
 
 from scenarios.effects.exposure_shift import share_left
 from scenarios.files import RoadFile
-from sim2real.auxiliary import camera_side
+from sim2real.auxiliary import camera_verdict
 from sim2real.perception.diagnose import diagnose_perception
 from sim2real.perception.frames import read_results
 from sim2real.result import Verdict
@@ -99,7 +99,7 @@ def test_a_modelled_blur_excuses_wrong_classes_where_no_confidence_is_measured(c
     read = [without(confused(x)) for x in logs(Camera())]
     assert judged(read).verdict is Verdict.UNKNOWN
     blurred = car_with(motion_blur={"exposure_s": 0.15})
-    assert "keeps seeing another class" not in " ".join(judged(read, car=blurred).unexplained)
+    assert "reports another class than road.yaml" not in " ".join(judged(read, car=blurred).unexplained)
 
 
 @pytest.mark.parametrize("confidence", beyond(1, [0.95, 1.0]))
@@ -138,9 +138,9 @@ def test_a_hold_out_without_a_camera_tells_nothing_of_the_shrink():
     late = candidate(finding, "camera_latency")
     assert np.isnan(late.after.total)
     assert np.isnan(late.shrink_percent.value)
-    assert any("hold-out has nothing of image_place" in text for text in late.evidence_against)
-    side = camera_side(finding)
-    assert "does not tell how far" in side.sentence
+    assert any("hold-out has no data of image_place" in text for text in late.evidence_against)
+    side = camera_verdict(finding)
+    assert "does not show by how much" in side.sentence
     assert "from" not in side.sentence
 
 
@@ -152,8 +152,8 @@ def test_an_unknown_gap_is_as_large_after_as_before():
     finding = diagnose(Camera(delay_s=0.1), 1, damage=slow_and_unsure)
     assert finding.verdict is Verdict.UNKNOWN
     assert finding.after == finding.before
-    odd = camera_side(finding).unexplained
-    assert (odd.signal, odd.depends_on, odd.sign) == ("image_confidence", "speed", "less where slow")
+    odd = camera_verdict(finding).unexplained
+    assert (odd.signal, odd.depends_on, odd.sign) == ("image_confidence", "speed", "less at low speed")
     assert np.isnan(odd.share)
 
 

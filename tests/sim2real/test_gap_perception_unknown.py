@@ -103,7 +103,7 @@ def test_rounded_or_saturated_confidence_is_no_repeated_result(digits):
         1,
         [
             ({"offset": (0.2, 0.0, 0.0)}, "class_friction_offset", "explains mu_reference"),
-            ({"blur_s": 0.03}, "motion_blur", "how the confidence goes with speed"),
+            ({"blur_s": 0.03}, "motion_blur", "how the confidence depends on speed"),
             ({"dimmed": 0.4}, "exposure_shift", "how low the confidence is"),
         ],
     ),
@@ -152,7 +152,7 @@ def test_streaks_of_errors_longer_than_the_scatter_excuse_it():
         return changed(log, image_class=classes)
 
     finding = diagnose(Camera(fps=20.0, wrong=0.0), 7, damage=streaky, spacing_m=60.0)
-    assert not any("beside road.yaml's borders" in text for text in finding.unexplained)
+    assert not any("away from road.yaml's borders" in text for text in finding.unexplained)
 
 
 @pytest.mark.parametrize(("speeds", "creeps"), [((10.0, 25.0, 10.0, 25.0), True), ((10.0, 25.0), False)])

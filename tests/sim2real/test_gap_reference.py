@@ -99,7 +99,7 @@ def test_position_never_falls_and_has_to_be_known():
     assert np.all(np.diff(way(faulty)) >= 0.0)
     blind = faulty.measured.copy()
     blind[:, 0] = np.nan
-    with pytest.raises(LogError, match="position_m tells nothing"):
+    with pytest.raises(LogError, match="position_m has no values"):
         way(replace(faulty, measured=blind))
 
 

@@ -53,11 +53,11 @@ def test_text_of_files_is_text():
 @pytest.mark.parametrize(
     ("rivals", "said"),
     [
-        (["torque_gain"], "mass_offset or as well torque_gain: these"),
-        (["mass_offset+aero_drag"], "mass_offset, perhaps not alone (with aero_drag): these"),
+        (["torque_gain"], "mass_offset or equally by torque_gain: these"),
+        (["mass_offset+aero_drag"], "mass_offset, possibly together with aero_drag: these"),
         (
             ["torque_gain+road_grade", *(f"mass_offset+{key}" for key in "abcde")],
-            "mass_offset or as well torque_gain with road_grade, perhaps not alone (with a or b or c or one of 2 more)",
+            "mass_offset or equally by torque_gain with road_grade, possibly together with a or b or c or 2 others",
         ),
     ],
 )

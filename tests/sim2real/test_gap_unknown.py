@@ -127,7 +127,7 @@ def test_motors_that_give_no_more_than_their_power_lack_a_share_of_torque_by_pow
     assert beyond.sum() >= 2
     np.testing.assert_allclose(found.y[beyond], limit_w / found.x[beyond] - 1.0, atol=0.06)
     np.testing.assert_allclose(found.y[found.x < 0.8 * limit_w], 0.0, atol=0.06)
-    assert all(word in found.sentence for word in ("share", "power", "[W]"))
+    assert all(word in found.sentence for word in ("relative torque correction", "power", "[W]"))
 
 
 @pytest.mark.long
@@ -267,10 +267,10 @@ X = np.linspace(-2.0, 5.0, 8)
         (np.full(8, -3.0), "is constant"),
         (2.0 * X, "is proportional to it"),
         (-0.3 * X * np.abs(X), "grows with its square"),
-        (-4.0 * np.sign(X), "has one size with the quantity's sign"),
+        (-4.0 * np.sign(X), "has a constant size and the sign of the quantity"),
         (1.0 + 2.0 * X, "is a straight line"),
         (4.0 - X + 2.0 * X * X, "is a parabola"),
-        (np.sin(2.5 * X), "bends in its own way"),
+        (np.sin(2.5 * X), "has no simple form"),
     ],
 )
 def test_shapes_in_words(y, words):
@@ -283,7 +283,7 @@ def test_noise_on_a_curve_does_not_change_its_shape():
 
 
 def test_a_curve_over_time_has_no_shape():
-    assert shape_of(curve("time", X, 2.0 * X)) == "comes and goes"
+    assert shape_of(curve("time", X, 2.0 * X)) == "varies"
 
 
 @pytest.mark.parametrize(
@@ -330,7 +330,7 @@ def test_what_one_sensor_alone_shows_and_no_term_explains_is_that_sensors(sizes,
     before = Measure(0.0, dict(zip(("wheel_speed", "vehicle_speed", "accel_x"), sizes, strict=True)))
     told = seen_alone(small_term(taken), before)
     assert told.subsystem == subsystem
-    assert ("alone shows it" in told.sentence) is (subsystem != "tyre")
+    assert ("shows the gap" in told.sentence) is (subsystem != "tyre")
 
 
 def test_every_quantity_has_a_unit_and_every_equation_asks_for_known_ones():

@@ -250,7 +250,7 @@ def test_a_payload_is_found_by_the_units_own_mass(folder, car, unit):
     assert best.effect == "mass_offset.mass_kg"
     assert best.estimate.value == pytest.approx(1500.0, abs=15.0)
     assert best.gap_after <= 1.2 * said.gap.noise_floor
-    assert "m takes most" in said.sentence
+    assert "m explains most" in said.sentence
     named = {said.causes[0].effect, *(e for group in said.ambiguous_with for e in group)}
     assert "mass_offset" in named
     assert said.to_json()["own_model"]["parameters"][0]["name"] == "m"

@@ -95,14 +95,14 @@ def test_what_was_found_mends_the_estimate(effects):
     assert error.after < 0.4 * error.before
     assert error.after < 0.025
     for key in effects:
-        assert f"{key} goes into" in error.sentence
+        assert f"{key} changes" in error.sentence
 
 
 def test_a_simulation_that_is_right_leaves_a_small_error():
     drive, _ = make({})
     error = trpac_error(CAR, drive, [])
     assert error.before == error.after < 0.02
-    assert "Nothing" in error.sentence
+    assert "No effect" in error.sentence
 
 
 def test_the_cars_own_effects_are_in_the_estimator_from_the_start():
@@ -126,7 +126,7 @@ def test_an_effect_without_a_place_leaves_the_estimate_as_it_is(effects):
     drive, _ = make(effects)
     error = trpac_error(CAR, drive, effects_of(effects))
     assert error.before == error.after
-    assert f"{next(iter(effects))} has no place" in error.sentence
+    assert f"{next(iter(effects))} has no parameter" in error.sentence
 
 
 def test_every_effect_has_the_place_that_is_documented():
@@ -172,7 +172,7 @@ def test_the_road_as_found_is_what_the_estimate_is_held_to(effects):
     error = trpac_error(CAR, drive, effects_of(effects))
     assert error.before == error.after < 0.02
     assert error.against == f"road.yaml's friction with {next(iter(effects))}"
-    assert "finds out by itself" in error.sentence
+    assert "estimates itself" in error.sentence
     assert trpac_error(CAR, drive, []).before > 0.05  # held to a road that is not there
 
 
@@ -239,8 +239,8 @@ def test_a_wrong_radius_sees_ice_on_a_dry_road_and_the_right_one_does_not():
     error = trpac_error(CAR, drive, effects_of(effects))
     assert error.before > 0.5
     assert error.after < 0.2  # holds about its start value, 0.8
-    assert re.search(r"Judged over \d+\.\d s before and 0\.0 s after", error.sentence)
-    assert "After, it never does" in error.sentence
+    assert re.search(r"Evaluated over \d+\.\d s before and 0\.0 s after", error.sentence)
+    assert "After, it never suffices" in error.sentence
 
 
 def test_a_tyre_thought_too_soft_misses_the_road_and_is_judged_for_it():
@@ -249,8 +249,8 @@ def test_a_tyre_thought_too_soft_misses_the_road_and_is_judged_for_it():
     error = trpac_error(CAR, drive, effects_of(effects))
     assert error.before == pytest.approx(0.8 - 0.45)  # never leaves its start value
     assert error.after < 0.025
-    assert re.search(r"Judged over 0\.0 s before and [1-9]\.\d s after", error.sentence)
-    assert "Before, it never does" in error.sentence
+    assert re.search(r"Evaluated over 0\.0 s before and [1-9]\.\d s after", error.sentence)
+    assert "Before, it never suffices" in error.sentence
 
 
 def test_a_locked_wheel_tells_nothing_by_its_commanded_torque():

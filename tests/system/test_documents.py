@@ -10,6 +10,7 @@ import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
+import browser
 import pages
 import pytest
 from foreign_clients import need_client
@@ -151,3 +152,9 @@ def test_mathematics_is_shown_without_a_script(site: Path) -> None:
     text = (site / "theory" / "equations.html").read_text(encoding="utf-8")
     assert text.count("<math") > 10
     assert "arithmatex" not in text
+
+
+def test_pages_of_the_site_in_a_browser(site: Path) -> None:
+    browser.require_chromium()
+    shown = ("index", "guide/estimate", "theory/equations", "reference/command_line")
+    assert browser.problems((name, site / f"{name}.html") for name in shown) == []

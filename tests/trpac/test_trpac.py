@@ -13,7 +13,7 @@ from road_picture import road_picture
 
 import trpac
 from scenarios.files import load_vehicle
-from scenarios.library import FOLDERS, located, shipped
+from scenarios.library import FOLDERS, located, networks_folder, shipped
 from trpac.extras import EXTRA_OF, MissingExtraError, extras
 from trpac_core.estimator import EstimatorConfig, TrpacEstimator
 from trpac_core.estimator_data import Method
@@ -352,6 +352,34 @@ def test_frames_of_a_drive_are_remembered():
     seen = [eye.step(road_picture(480, 300), t, speed=10.0) for t in (0.0, 0.1)]
     assert seen[0].surface in ("dry", "wet", "snow_ice")
     assert eye._way_m == pytest.approx(1.0)
+
+
+def test_networks_of_ones_own_judge_pictures_and_go_into_a_unit(tmp_path):
+    own = tmp_path / "own"
+    own.mkdir()
+    for name in ("segmenter.onnx", "surface.onnx"):
+        (own / name).write_bytes((networks_folder() / name).read_bytes())
+    picture = road_picture(480, 300)
+    assert trpac.classify(picture, networks=own) == trpac.classify(picture)
+    eye = trpac.VisionEstimator("paper", networks=own)
+    assert eye.step(picture, 0.0, speed=10.0).surface in ("dry", "wet", "snow_ice")
+    with zipfile.ZipFile(trpac.build_fmu(tmp_path, networks=own)) as unit:
+        assert unit.read("resources/surface.onnx") == (own / "surface.onnx").read_bytes()
+    for given in ({"kind": "native"}, {"unit": "ReferencePlant"}):
+        with pytest.raises(trpac.TrpacError, match="holds no networks"):
+            trpac.build_fmu(tmp_path, networks=own, **given)
+    (own / "surface.onnx").write_bytes(b"no network")
+    with pytest.raises(trpac.TrpacError, match=r"surface\.onnx"):
+        trpac.build_fmu(tmp_path, networks=own)
+
+
+def test_a_package_is_built_and_another_system_is_refused(tmp_path):
+    package = trpac.build_ssp(tmp_path, system="one_wheel")
+    assert package == tmp_path / "trpac_one_wheel.ssp"
+    with zipfile.ZipFile(package) as archive:
+        assert "SystemStructure.ssd" in archive.namelist()
+    with pytest.raises(trpac.TrpacError, match="four_wheels, one_wheel"):
+        trpac.build_ssp(tmp_path, system="five_wheels")
 
 
 def test_a_unit_is_built_in_each_kind_and_another_is_refused(native_file, tmp_path):

@@ -135,9 +135,9 @@ class TestApplied:
         path = saved(tmp_path, said, car)
         changed(path, provenance={})
         text = words(run("gap", "apply", path, "--vehicle", car, "--out", out).stdout)
-        assert "30 % of the squared gap is a difference between the models and no fault" in text
+        assert "30 % of the squared gap is a model difference that no effect describes" in text
         assert "camera_latency acts in the camera chain" in text
-        assert "does not say which vehicle file" in text
+        assert "does not name its vehicle file" in text
         assert load_vehicle(out).effects["camera_latency"] == {"delay_s": 0.1}
 
     def test_python_has_the_same_function(self, tmp_path):

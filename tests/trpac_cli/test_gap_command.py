@@ -102,7 +102,7 @@ class TestDiagnose:
         assert said.sentence in text
         assert f"gap {said.gap.before.total:.2f}" in text
         assert (said.causes[0].effect in text) == (name != "no_gap")
-        assert (name == "ambiguous") == ("To tell them apart" in text)
+        assert (name == "ambiguous") == ("To separate them" in text)
         assert ("of the squared gap: " in text) == (name != "no_gap")
         if name == "partial":
             assert "of the squared gap: mass_offset 62 %, structure 34 %, noise 4 %" in text
@@ -306,8 +306,8 @@ class TestDemo:
         [
             ("tyre_relaxation", "identified", "[green]right"),
             ("torque_lag", "identified", "[red]not right"),
-            ("torque_gain", "ambiguous", "cannot tell apart"),
-            ("tyre_relaxation", "unknown", "not[/red] try it"),
+            ("torque_gain", "ambiguous", "cannot separate"),
+            ("tyre_relaxation", "unknown", "not[/red] fit it"),
             ("mass_offset", "partial", "[green]right"),
             ("torque_lag", "no_gap", "says 'no_gap' and ranks the hidden effect 1 of 3"),
         ],

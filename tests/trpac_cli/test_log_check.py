@@ -56,7 +56,7 @@ def test_a_mapping_is_proposed_corrected_by_nobody_and_good(frame, german, tmp_p
     text = words(done.output)
     assert "read as: CP1252; semicolons; decimal comma" in text
     assert "vehicle_speed_m_s Geschw [km/h] km/h 0.277778 100" in text
-    assert "no measured position" in text
+    assert "usable on a road of one stretch, since no position is measured" in text
     log = read_log(out)
     assert log.warnings == ()
     for name in set(log.signals) - {"position_m"}:

@@ -100,18 +100,18 @@ def sliding(normalised_slip: Array) -> Array:
 def dugoff(theta: Array, slip: Array, load_n: float, stiffness_n: Array) -> Curve:
     """Curve of the modified Dugoff tyre, see `trpac_core.tyre`, at unsigned slips; shapes that broadcast [-], [N]."""
     rolls = 1.0 - slip
-    elastic = stiffness_n * slip / rolls / load_n
+    linear = stiffness_n * slip / rolls / load_n
     shape = 1.27 + slip * (1.15 * slip - 1.63) + 0.75 * slip * rolls * theta
     shape_by_slip = 2.3 * slip - 1.63 + 0.75 * (1.0 - 2.0 * slip) * theta
-    elastic_by_slip = stiffness_n / (load_n * rolls * rolls)
-    slides = theta < 2.0 * elastic
-    share = np.where(slides, theta * (1.0 - 0.25 * theta / elastic), elastic)
-    share_by_elastic = np.where(slides, 0.25 * theta * theta / (elastic * elastic), 1.0)
+    linear_by_slip = stiffness_n / (load_n * rolls * rolls)
+    slides = theta < 2.0 * linear
+    share = np.where(slides, theta * (1.0 - 0.25 * theta / linear), linear)
+    share_by_linear = np.where(slides, 0.25 * theta * theta / (linear * linear), 1.0)
     return Curve(
         share * shape,
-        share_by_elastic * elastic_by_slip * shape + share * shape_by_slip,
-        share_by_elastic * elastic * shape,
-        sliding(elastic / theta),
+        share_by_linear * linear_by_slip * shape + share * shape_by_slip,
+        share_by_linear * linear * shape,
+        sliding(linear / theta),
     )
 
 
