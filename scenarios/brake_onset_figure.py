@@ -9,13 +9,14 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
+from scenarios import plot_style
 from scenarios.brake_onset import Comparison, Onset, Plan
 
 FROM_M, TOP = -15.0, 1.3
 """Where the figure begins, from the border [m], and the end of the axis of TRPAC [-]."""
 LONGEST_M = 100.0
 """End of the axis of stopping distances; longer intervals end in an arrow [m]."""
-TRUTH, GREY = "#000000", "#555555"
+TRUTH, GREY = plot_style.INK.light, plot_style.GREY.light
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,8 @@ class Series:
 
 
 SERIES = (
-    Series("with_camera", "with camera", "#0072B2", "-", ""),
-    Series("without_camera", "without camera", "#D55E00", "--", "//"),
+    Series("with_camera", "with camera", plot_style.BLUE.light, "-", ""),
+    Series("without_camera", "without camera", plot_style.VERMILLION.light, "--", "//"),
 )
 
 
@@ -51,8 +52,9 @@ def draw_brake_onset(comparisons: Sequence[Comparison], path: Path) -> None:
             _planned_stops(below, compared.onset)
         axes[0, 0].set_ylabel("TRPAC [-]")
         handles, labels = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="upper center", ncols=len(labels), frameon=False, fontsize=12)
-        figure.tight_layout(rect=(0.0, 0.0, 1.0, 0.95))
+        columns = min(2 * len(comparisons), len(labels))
+        figure.legend(handles, labels, loc="upper center", ncols=columns, frameon=False, fontsize=12)
+        figure.tight_layout(rect=(0.0, 0.0, 1.0, 0.95 if columns == len(labels) else 0.91))
         figure.savefig(path, dpi=100)
         plt.close(figure)
 
@@ -91,7 +93,7 @@ def _planned_stops(axis: Axes, onset: Onset) -> None:
         stop_m = LONGEST_M if plan.planned_stop_m is None else plan.planned_stop_m
         axis.barh(y, stop_m, color=series.colour, alpha=0.75, hatch=series.hatch, edgecolor="white")
         _interval(axis, y, plan)
-    axis.barh(len(rows), onset.shortest_stop_m, color="#999999")
+    axis.barh(len(rows), onset.shortest_stop_m, color=plot_style.GREY.light, alpha=0.6)
     axis.text(
         LONGEST_M - 1, len(rows), f"{onset.shortest_stop_m:.0f} m", ha="right", va="center", fontsize=12
     )

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 import yaml
 from long import long
+from report_page import require_report
 from typer.testing import CliRunner
 
 from scenarios.brake_onset import compare
@@ -75,8 +76,8 @@ def test_the_report_begins_with_the_brake_onset(short_scenario, unit_file, tmp_p
         assert onset["with_camera"][name] == pytest.approx(last[name])
     assert {"TRPAC", "TRPAC_low", "TRPAC_high", "planned_stop_m"} <= set(onset["with_camera"])
     assert onset["simulated_stop_m"] > 0.9 * onset["shortest_stop_m"]
-    report = (out / "report.html").read_text()
-    assert report.count("data:image/") == 3
+    report = require_report((out / "report.html").read_text()).source
+    assert report.count("data:image/") == 2
     assert report.index("<img") < report.index("At brake onset") < report.index("The drive short &lt;i&gt;")
     assert "At brake onset" in result.output
 
