@@ -20,6 +20,8 @@ CAR, ROAD, CAMERA = "four_in_wheel_motor_ev", "paper_simulation", "paper"
 LAG_S = 0.08
 """Lag of the torque in the logs for a diagnosis, which car.yaml lacks [s]."""
 NOISE = SensorNoise(wheel_speed_noise_rad_s=0.02, vehicle_speed_noise_m_s=0.02, accel_x_noise_m_s2=0.05)
+BRAKE_FROM_S, BRAKE_NM = 8.8, (-570.0, -570.0, -310.0, -310.0)
+"""The drive ends with a stop on the wet road: its begin, and the torques of the wheels, near the limit [s, N m]."""
 FRAMES, FIRST_FRAME_M, FRAME_STEP_M = 20, 8.0, 0.75
 """Number of pictures, and the front axle's position at the first and from one to the next [m]; ice from 20 m on."""
 FOREIGN = {
@@ -66,7 +68,8 @@ def example(folder: str | Path, progress: Progress = silent) -> tuple[Path, ...]
     folder = Path(folder)
     car, road = Vehicle.builtin(CAR), Road.builtin(ROAD)
     time_s = np.arange(0.0, 10.0, 0.01)
-    drive = simulate(car, road, torque=pedal(time_s), noise=NOISE, seed=1)
+    torque = np.where(time_s[:, None] < BRAKE_FROM_S, pedal(time_s), BRAKE_NM)
+    drive = simulate(car, road, torque=torque, noise=NOISE, seed=1)
     with written_whole(folder) as made:
         for kind, name, file in (
             ("vehicle", CAR, "car"),

@@ -134,7 +134,7 @@ def example(
     console = Terminal()
     files = [path for path in written if path.parent == folder]
     console.print("  ".join(str(path) for path in files), soft_wrap=True)
-    console.print(f"{folder / 'frames'}: {len(written) - len(files)} pictures")
+    console.print(f"{folder / 'frames'}: {len(written) - len(files)} pictures", soft_wrap=True)
 
 
 def _score_table(summary: dict) -> Table:
