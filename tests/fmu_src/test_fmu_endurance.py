@@ -78,7 +78,7 @@ def test_random_inputs_and_calls(unit: str) -> None:
     assert result["taken_down"] >= 5, "rubbish has met flags that were up"
 
 
-@pytest.mark.parametrize("kind", beyond(16, DAMAGED))
+@pytest.mark.parametrize("kind", beyond(8, DAMAGED))
 def test_damaged_files(kind: str) -> None:
     assert run_kind(kind, SEED, DAMAGED[kind])["shown"] == []
 

@@ -107,6 +107,7 @@ def test_surface_contract(surface):
 
 
 @pytest.mark.long
+@long
 def test_readable_road_is_told_from_what_is_none(surface, held_out):
     """Rendered roads that no training has seen, and noise, an even grey and a grid, none of them as in the training."""
     rng = np.random.default_rng(1)
@@ -165,6 +166,7 @@ def test_files_name_no_place_of_their_making(name):
 
 
 @long
+@long
 def test_rendered_worlds_never_seen_are_classified(surface, held_out):
     """Floor 0.65: the card's 0.80 on all test worlds less three standard errors of 36 views of 12 worlds.
 
@@ -179,6 +181,7 @@ def test_rendered_worlds_never_seen_are_classified(surface, held_out):
 
 
 @long
+@long
 def test_rendered_worlds_never_seen_are_segmented(segmenter, held_out):
     samples, _ = held_out
     ious, lit_as_shadow = [], []
@@ -192,6 +195,7 @@ def test_rendered_worlds_never_seen_are_segmented(segmenter, held_out):
     assert np.mean(lit_as_shadow) <= 0.1
 
 
+@long
 def test_shadow_on_rendered_road_is_told_from_lit_road(segmenter, held_out):
     """The card says how little of the rendered shadow is found; what is called shadow must still be mostly that."""
     samples, _ = held_out

@@ -22,6 +22,7 @@ import pandas as pd
 import psutil
 import pytest
 import yaml
+from long import long
 from report_page import Page, require_report
 from typer.testing import CliRunner
 
@@ -246,6 +247,7 @@ def tls_cluster(tmp_path: Path) -> Iterator[tuple[str, Certificates]]:
             process.wait(20)
 
 
+@long
 @pytest.mark.e2e
 def test_a_sweep_over_tls_and_nobody_without_the_certificate(
     sweep_of: Callable[..., Sweep],

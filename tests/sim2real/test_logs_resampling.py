@@ -135,7 +135,10 @@ def test_drives_leave_out_what_follows_a_torque_that_is_lost_for_long(tmp_path):
     left_out = source.drive.time_s[~source.drive.moving]
     assert left_out.min() == pytest.approx(4.0, abs=0.02)
     assert left_out.max() == pytest.approx(4.4 + RECOVERY_S, abs=0.02)
-    assert "2.41 s are left out: the torque of a wheel is missing there or shortly before." in source.log.warnings
+    assert (
+        "2.41 s are left out: the torque of a wheel is missing there or shortly before."
+        in source.log.warnings
+    )
     assert np.isfinite(source.drive.torque_nm).all()
 
 

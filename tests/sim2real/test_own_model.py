@@ -256,6 +256,7 @@ def test_a_payload_is_found_by_the_units_own_mass(folder, car, unit):
     assert said.to_json()["own_model"]["parameters"][0]["name"] == "m"
 
 
+@long
 def test_what_cannot_be_told_of_the_parameters_is_said_before_anything_is_fitted(car, unit, tmp_path):
     """With a stiffness that goes with the load, a heavier car and a weaker motor differ by the air's drag alone."""
     spans = {"m": (1000.0, 1900.0), "gain": (0.7, 1.3), "h": (0.1, 1.2), "fail_at": (1e8, 1e10)}

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from long import beyond
 
 from scenarios.effects import EFFECTS, make_effect
 from scenarios.files import RoadFile, VehicleFile
@@ -71,22 +72,25 @@ def effects_of(effects):
 
 @pytest.mark.parametrize(
     "effects",
-    [
-        {"wheel_radius_offset": {"radius_m": 0.284}},
-        {"torque_gain": {"factor": 0.88}},
-        {"torque_delay": {"delay_s": 0.06}},
-        {"torque_lag": {"time_constant_s": 0.1}},
-        {"tyre_stiffness_offset": {"stiffness_n": 38_000.0}},
-        {"mass_offset": {"mass_kg": 250.0}},
-        {"wheel_inertia_offset": {"inertia_kg_m2": 2.4}},
-        {"load_transfer": {"cog_height_m": 0.54}},
-        {"rolling_resistance": {"coefficient": 0.03}},
-        {"brake_drag": {"torque_nm": 30.0}},
-        {"wheel_speed_delay": {"delay_s": 0.04}},
-        {"vehicle_speed_delay": {"delay_s": 0.04}},
-        {"vehicle_speed_scale": {"factor": 1.02}},
-        {"torque_gain": {"factor": 0.9}, "wheel_radius_offset": {"radius_m": 0.295}},
-    ],
+    beyond(
+        5,
+        [
+            {"wheel_radius_offset": {"radius_m": 0.284}},
+            {"torque_gain": {"factor": 0.88}},
+            {"torque_delay": {"delay_s": 0.06}},
+            {"torque_lag": {"time_constant_s": 0.1}},
+            {"tyre_stiffness_offset": {"stiffness_n": 38_000.0}},
+            {"mass_offset": {"mass_kg": 250.0}},
+            {"wheel_inertia_offset": {"inertia_kg_m2": 2.4}},
+            {"load_transfer": {"cog_height_m": 0.54}},
+            {"rolling_resistance": {"coefficient": 0.03}},
+            {"brake_drag": {"torque_nm": 30.0}},
+            {"wheel_speed_delay": {"delay_s": 0.04}},
+            {"vehicle_speed_delay": {"delay_s": 0.04}},
+            {"vehicle_speed_scale": {"factor": 1.02}},
+            {"torque_gain": {"factor": 0.9}, "wheel_radius_offset": {"radius_m": 0.295}},
+        ],
+    ),
     ids="+".join,
 )
 def test_what_was_found_mends_the_estimate(effects):

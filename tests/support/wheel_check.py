@@ -16,7 +16,6 @@ from pages import run_page
 COMMANDS = (
     "trpac --version",
     "trpac run paper_simulation --out out/run",
-    "trpac gap demo --out out/gap_demo",
     "trpac vision classify example/frames --out classes.csv",
     "trpac hil --with-plant --duration-s 5 --quiet --out out/hil",
 )

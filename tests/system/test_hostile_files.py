@@ -28,6 +28,7 @@ import pyarrow.parquet as pq
 import pytest
 from asammdf import MDF, Signal
 from log_maker import make_frame
+from long import long
 from road_picture import road_picture
 
 ROOT = Path(__file__).parents[2]
@@ -515,12 +516,18 @@ def command() -> Iterator[Callable[[Arguments, Path], dict[str, Any]]]:
     host.wait(timeout=60)
 
 
+SLOW = ("examined unit unfolds", "part is nested", "part of another number", "Parquet of 5 GB")
+"""Kinds that take many seconds and have a neighbour of the same reader in the list."""
+
+
 def made(make: Make, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Arguments:
     monkeypatch.chdir(folder)  # a socket's address must be short
     return make(folder)
 
 
-@pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=long) if name in SLOW else name for name in REFUSED]
+)
 def test_is_refused_in_a_line(
     name: str, command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

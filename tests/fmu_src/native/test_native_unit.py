@@ -15,6 +15,7 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 from fmu_unit import DRIVING, Unit
+from long import beyond
 from native_drives import SIGNALS, drive, drive_of_four, pedal, rows
 from native_units import ATTRIBUTES, bits, called, compiled_host, driven
 from plant_drives import SCENARIOS
@@ -210,7 +211,9 @@ def test_no_memory_is_allocated_after_the_instantiation(host_folder):
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="the sanitizers of gcc")
-@pytest.mark.parametrize(("unit", "more"), [("TrpacEstimator", ()), ("TrpacEstimator4W", ("-DFOUR_WHEELS",))])
+@pytest.mark.parametrize(
+    ("unit", "more"), beyond(1, [("TrpacEstimator4W", ("-DFOUR_WHEELS",)), ("TrpacEstimator", ())])
+)
 def test_values_and_states_of_no_sense_do_no_harm(tmp_path, unit, more):
     (tmp_path / "sources").mkdir()
     for name, text in sources(UNITS[unit].info, "guid").items():
