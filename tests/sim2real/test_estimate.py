@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pandas as pd
 import pytest
+import schemas
 from log_maker import make_frame, save
 from report_page import require_report
 from typer.testing import CliRunner
@@ -114,6 +115,7 @@ class TestCommand:
 
     def test_the_summary_holds_the_errors_of_all_estimators(self, estimated):
         summary = json.loads((estimated[0] / "summary.json").read_text())
+        schemas.validate("estimate_summary", summary)
         assert summary["errors"]["compared"] == "TRPAC_peak"
         for name in ("robust", "DE", "slip-slope", "EKF", "UKF"):
             assert set(summary["errors"][name]) == {"excited", "seen", "all"}

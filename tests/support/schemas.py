@@ -39,6 +39,20 @@ def seed(value: Any) -> dict[str, Any]:
     return {"type": "object", "properties": told} if told else {}
 
 
+def loosened(schema: Any) -> Any:
+    """A schema in which no key below the top is required, numbers may be whole, and any value null."""
+    if isinstance(schema, list):
+        return [loosened(part) for part in schema]
+    if not isinstance(schema, dict):
+        return schema
+    kept = {
+        key: loosened(part) for key, part in schema.items() if key != "required" or isinstance(part, dict)
+    }
+    if isinstance(kept.get("type"), str):
+        kept["type"] = ["null", "number" if kept["type"] == "integer" else kept["type"]]
+    return kept
+
+
 def main(name: str, description: str, files: list[str]) -> None:
     from genson import SchemaBuilder
 
@@ -49,10 +63,10 @@ def main(name: str, description: str, files: list[str]) -> None:
             builder.add_schema(seed(value))
         builder.add_object(value)
     FOLDER.mkdir(exist_ok=True)
-    schema = {"$schema": builder.to_schema()["$schema"], "title": name, "description": description}
-    (FOLDER / f"{name}.json").write_text(
-        json.dumps(schema | builder.to_schema(), indent=1) + "\n", encoding="utf-8"
-    )
+    schema = loosened(builder.to_schema()) | {"type": "object"}
+    head = {"$schema": schema.pop("$schema"), "title": name, "description": description}
+    head["required"] = sorted(set.intersection(*map(set, values)))
+    (FOLDER / f"{name}.json").write_text(json.dumps(head | schema, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

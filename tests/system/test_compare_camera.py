@@ -78,7 +78,7 @@ def test_the_report_begins_with_the_brake_onset(short_scenario, unit_file, tmp_p
     assert onset["simulated_stop_m"] > 0.9 * onset["shortest_stop_m"]
     report = require_report((out / "report.html").read_text()).source
     assert report.count("data:image/") == 2
-    assert report.index("<img") < report.index("At brake onset") < report.index("The drive short &lt;i&gt;")
+    assert report.index("<img") < report.index("At brake onset") < report.index("Scores per stretch of road")
     assert "At brake onset" in result.output
 
 

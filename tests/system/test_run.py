@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import schemas
 import yaml
 from report_page import require_report
 from typer.testing import CliRunner
@@ -94,6 +95,7 @@ def test_run_writes_report_figure_log_and_scores(scenario_file, unit_file, tmp_p
     assert result.exit_code == 0, result.output
     assert sorted(p.name for p in out.iterdir()) == ["figure17.png", "log.csv", "report.html", "summary.json"]
     summary = json.loads((out / "summary.json").read_text())
+    schemas.validate("run_summary", summary)
     assert set(summary["estimators"]) == {"IFE", "DE", "robust"}
     assert {"fmu_sha256", "seed", "versions"} <= set(summary)
     for scores in summary["estimators"].values():

@@ -12,6 +12,7 @@ import made_up_diagnosis as made_up
 import numpy as np
 import pandas as pd
 import pytest
+import schemas
 from command_line import run, words
 
 from scenarios.effects import EFFECTS
@@ -342,6 +343,7 @@ def test_the_demonstration_as_a_newcomer_runs_it(tmp_path):
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, done.stderr
     said = json.loads((tmp_path / "out/diagnosis.json").read_text())
+    schemas.validate("diagnosis", said)
     truth = json.loads((tmp_path / "out/truth.json").read_text())
     assert said["causes"][0]["effect"] == truth["effect"]
     assert said["gap"]["after"]["total"] < said["gap"]["before"]["total"]

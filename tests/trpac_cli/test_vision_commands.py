@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pandas as pd
 import pytest
+import schemas
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
@@ -325,6 +326,7 @@ def test_a_folder_of_frames_gives_what_the_estimator_gives_frame_by_frame(folder
     as_the_estimator_says(folder, table)
     assert table["ms"].between(0.0, 5000.0, inclusive="neither").all()
     summary = json.loads((out / "summary.json").read_text())
+    schemas.validate("vision_summary", summary)
     assert summary["frames"] == 6
     assert summary["unreadable"] == []
     assert summary["class_share"] == {"dry": 0.5, "wet": 0.0, "snow_ice": 0.5}

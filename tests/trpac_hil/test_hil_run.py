@@ -16,6 +16,7 @@ import can
 import cv2
 import numpy as np
 import pytest
+import schemas
 from asammdf import MDF
 from fmu_unit import Unit as Client
 from long import beyond, long
@@ -135,6 +136,7 @@ def test_what_is_on_the_bus_is_what_fmpy_gives_for_the_same_inputs(
 
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["log.mf4", "summary.json"]
     assert summary == json.loads((tmp_path / "out" / "summary.json").read_text())
+    schemas.validate("hil_summary", summary)
     assert summary["cycles"] == len(log["time_s"]) == len(estimates) - 1
     assert summary["cycles"] + summary["overruns"]["left_out"] == 800
     assert summary["discarded_steps"] == 0
