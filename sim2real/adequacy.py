@@ -23,8 +23,9 @@ from scenarios.effects.base import mean_of_wheels
 from scenarios.files import RoadFile
 from sim2real.logs.errors import LogError
 from sim2real.observing.drive import CHANNELS, SPEED, WHEEL, Drive
+from sim2real.observing.evidence import SETTLING_S
 from sim2real.observing.observer import Simulation
-from sim2real.sources import Sources
+from sim2real.sources import Source, Sources
 from trpac_core.vehicle import GRAVITY_M_S2, WHEELS
 
 Array = NDArray[np.float64]
@@ -149,6 +150,7 @@ def require_adequate(sources: Sources) -> tuple[str, ...]:
     motions = [_motion(model, car, source.drive) for source in sources.all]
     held, fit = motions[-1], motions[:-1]
     problems = [text for motion in motions for text in _untold_torque(motion)]
+    problems += [text for source in sources.all for text in _uncounted(source.drive)]
     problems += _stillness(fit, held, car)
     warnings = _excitation(fit, [source.drive for source in sources.fit], car)
     of_mass = {motion.name: mass for motion in motions if (mass := _mass(motion)) is not None}
@@ -298,6 +300,16 @@ def _untold_torque(motion: Motion) -> list[str]:
         f"{motion.name}: the wheel torques never change ({size}) while the car's acceleration goes from {slowest:.1f} "
         f"to {fastest:.1f} m/s^2; expected the commanded torque of each wheel, brakes included. A diagnosis needs it: "
         "record it, or map its columns."
+    ]
+
+
+def _uncounted(drive: Drive) -> list[str]:
+    """A log whose car moves only while the observer settles: nothing of it can be compared."""
+    if np.any(drive.moving & (drive.time_s >= drive.time_s[0] + SETTLING_S)):
+        return []
+    return [
+        f"{drive.name}: the car moves only in the first {SETTLING_S:g} s, which are not compared with the simulation; "
+        "expected a log of driving."
     ]
 
 

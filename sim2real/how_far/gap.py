@@ -62,6 +62,8 @@ def shrink(evidence: Evidence, before: Sequence[Array], after: Sequence[Array], 
     weights_before, counts = block_squares(evidence, before)
     weights_after, _ = block_squares(evidence, after)
     blocks = len(counts)
+    if not blocks:
+        return Interval(float("nan"), float("nan"), float("nan"), "%")
     generator = np.random.default_rng(seed)
     values = []
     for rows in generator.integers(0, blocks, (BOOTSTRAP, blocks)):
@@ -82,12 +84,18 @@ def energy(squares: Array, counts: Array) -> float:
 
 
 def block_squares(evidence: Evidence, rests: Sequence[Array]) -> tuple[Array, Array]:
-    """Per block and signal, shape (blocks, signals): sums of squares in units of the noise, and how many samples."""
+    """Per block and signal, shape (blocks, signals): sums of squares in units of the noise, and how many samples.
+
+    A block without any sample that counts, as of a standing car, is left out: a resampling of such blocks has no gap.
+    """
     squares, counts = [], []
     for drive, noise, rest in zip(evidence.drives, evidence.noises, rests, strict=True):
         z, length = noise.scaled(rest), drive.rows_in(BLOCK_S)
         for at in range(0, len(drive), length):
             parts = [z[at : at + length, GROUPS[name]] for name in GAP_SIGNALS]
-            squares.append([np.nansum(part**2) for part in parts])
-            counts.append([np.isfinite(part).sum() for part in parts])
-    return np.array(squares), np.array(counts, dtype=np.float64)
+            count = [np.isfinite(part).sum() for part in parts]
+            if any(count):
+                squares.append([np.nansum(part**2) for part in parts])
+                counts.append(count)
+    shape = (-1, len(GAP_SIGNALS))
+    return np.array(squares).reshape(shape), np.array(counts, dtype=np.float64).reshape(shape)

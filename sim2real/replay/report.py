@@ -92,7 +92,7 @@ def verdict(summary: dict[str, Any]) -> str:
 
 
 def sentences(summary: dict[str, Any]) -> list[str]:
-    """Whether the estimate can be trusted; the estimate at the end; how much the tyres showed; how far the estimate is off a reference."""
+    """Whether the estimate can be trusted; the estimate at the end; what the tyres showed; its errors."""
     said, driven, method = summary["excitation"], summary["estimate"], Method.of(summary["method"])
     theta, std, low, high = (driven[f"{n}_end"] for n in ("TRPAC", "TRPAC_std", "TRPAC_low", "TRPAC_high"))
     first, *wide = known.sentences(theta, std, *known.interval(method, theta, std, low, high))

@@ -142,6 +142,13 @@ class TestExcitation:
         other = three()[1]
         assert require_adequate(sources(three(torque_of, speed_m_s)[0], other, three()[2])) == ()
 
+    def test_a_car_that_stands_from_the_first_moments_on_is_refused(self, sources):
+        def stopped(drive):
+            return {"vehicle_speed_m_s": np.maximum(0.75 - drive.time_s, 0.0)}
+
+        with pytest.raises(LogError, match=r"held.csv: the car moves only in the first 0.3 s"):
+            require_adequate(sources(*three(), columns=stopped))
+
     def test_of_both_in_short_windows_is_not_said_to_be_one(self, sources):
         """A launch from standstill, and then a lift: each is shorter than what smoothing takes off its ends."""
         lively = lambda duration_s: trace(  # noqa: E731
