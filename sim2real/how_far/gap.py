@@ -43,7 +43,11 @@ def measure(evidence: Evidence, rests: Sequence[Array]) -> Measure:
 
 
 def noise_floor(model: Simulation, evidence: Evidence, seed: int) -> float:
-    """What `measure` gives where the model is right: a free run of the model itself with fresh noise, followed."""
+    """What `measure` gives where the model is right: a free run of the model itself with fresh noise, followed.
+
+    About 1; more where the logged torque spins up or locks the wheels of the free run from its start on: single samples
+    then tell its state no better than to many times the noise.
+    """
     generator = np.random.default_rng(seed)
     rests = []
     for drive, noise in zip(evidence.drives, evidence.noises, strict=True):

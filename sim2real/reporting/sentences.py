@@ -20,7 +20,7 @@ SHOWN = 3
 
 def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause]) -> str:
     """The verdict itself."""
-    size = f"{gap.before.total:.1f} times the noise floor"
+    size = f"{gap.before.total:.1f} times the sensor noise"
     if decision.verdict is Verdict.NO_GAP:
         return "Simulation and logs agree within the sensor noise: no effect is needed."
     if decision.verdict is Verdict.UNKNOWN:
@@ -28,7 +28,7 @@ def verdict(decision: Decision, gap: Gap, causes: Sequence[Cause]) -> str:
     top = causes[0]
     digits = 1 if gap.before.total > 1.1 else 2
     before, after = (f"{side.total:.{digits}f}" for side in (gap.before, gap.after))
-    cut = f"the gap decreases from {before} to {after} times the noise floor"
+    cut = f"the gap decreases from {before} to {after} times the sensor noise"
     if decision.verdict is Verdict.COMPOUND:
         return f"{' and '.join(decision.winner.ids)} are needed together: {cut}."
     if decision.verdict is Verdict.AMBIGUOUS:

@@ -68,7 +68,9 @@ def test_a_sentence_lists_a_few_rivals_and_counts_the_others(rivals, said):
     fitness = Fitness(1.0, {})
     decision = Decision(Verdict.AMBIGUOUS, best, tuple(others), {}, fitness, fitness)
     diagnosis = BRIEF["ambiguous"]
-    assert said in sentences.verdict(decision, diagnosis.gap, diagnosis.causes)
+    told = sentences.verdict(decision, diagnosis.gap, diagnosis.causes)
+    assert said in told
+    assert f"a gap of {diagnosis.gap.before.total:.1f} times the sensor noise" in told.replace("The gap", "a gap")
 
 
 @pytest.mark.parametrize("name", DIAGNOSES)
