@@ -322,6 +322,8 @@ class Diagnosis:
     next_manoeuvre: NextManoeuvre | None = None
     unexplained: Unexplained | None = None
     """What is left where no effect explains the gap (`unknown`), or beside the effect (`partial`)."""
+    advice: str = ""
+    """What to try where no effect is named but one comes near."""
     build: dict[str, float] = field(default_factory=dict)
     """Differences of the car's build beside the effect: change to its size, see docs/theory/diagnosis.md."""
     budget: Budget | None = None
@@ -356,6 +358,7 @@ class Diagnosis:
             "cannot_rule_out": list(self.cannot_rule_out),
             "next_manoeuvre": _profile(self.next_manoeuvre),
             "unexplained": _term(self.unexplained),
+            "advice": self.advice,
             "build": self.build,
             "budget": None if self.budget is None else self.budget.to_json(),
             "budget_intervals": None if self.budget is None else self.budget.intervals(),

@@ -406,6 +406,8 @@ def _summarise(console: Terminal, diagnosis: Diagnosis) -> None:
         console.print(_cause_table(diagnosis))
     if diagnosis.next_manoeuvre is not None:
         console.print(f"To separate them: {diagnosis.next_manoeuvre.sentence}")
+    if diagnosis.advice:
+        console.print(f"To try: {diagnosis.advice}")
     for warning in diagnosis.warnings:
         console.print(warning, style="yellow")
 
