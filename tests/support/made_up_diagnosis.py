@@ -236,8 +236,8 @@ def unknown() -> Diagnosis:
     return replace(
         identified(),
         verdict=Verdict.UNKNOWN,
-        sentence="There is a gap of 4.1 times the sensor noise, and no effect of the library explains it: the force balance "
-        "lacks a force that opposes motion and grows with speed.",
+        sentence="There is a gap of 4.1 times the sensor noise, and no effect of the library explains it: "
+        "the force balance lacks a force that opposes motion and grows with speed.",
         gap=Gap(before, before, 1.0),
         causes=_causes(
             ("aero_drag", 0.05, {"drag_area_m2": Interval(0.9, 0.8, 1.0, "m^2")}, 2.9, 29.0), *OTHERS[:2]
