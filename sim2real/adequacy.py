@@ -20,8 +20,10 @@ from scipy.ndimage import uniform_filter1d
 
 from scenarios.effects import EFFECTS
 from scenarios.effects.base import mean_of_wheels
+from scenarios.files import RoadFile
 from sim2real.logs.errors import LogError
-from sim2real.observing.drive import CHANNELS, SPEED, WHEEL
+from sim2real.observing.drive import CHANNELS, SPEED, WHEEL, Drive
+from sim2real.observing.evidence import SETTLING_S
 from sim2real.observing.observer import Simulation
 from sim2real.sources import Source, Sources
 from trpac_core.vehicle import GRAVITY_M_S2, WHEELS
@@ -34,7 +36,7 @@ HALF_S = 0.5
 DRIVING = 0.03
 """Force over weight from which on a car drives, or brakes: beyond air drag and rolling resistance at 20 m/s [-]."""
 REGIME_S = 1.0
-"""Least time in a regime for the logs to hold it: one smoothed sample [s]."""
+"""Least time in a regime for the logs to hold it [s]."""
 MOVED_M_S2 = 0.2
 """Standard deviation of the acceleration below which a drive excites hardly anything: that of a 2 % grade [m/s^2]."""
 STILL_M_S2, STILL = 0.03, 0.005
@@ -144,23 +146,77 @@ def require_adequate(sources: Sources) -> tuple[str, ...]:
         Nothing happens in the logs, torque is missing or reversed, or they are of another car than the file's.
     """
     model = Simulation(sources.vehicle)
-    car = _car(model, sources.holdout)
-    motions = [_motion(model, car, source) for source in sources.all]
+    car = _car(model, sources.holdout.road)
+    motions = [_motion(model, car, source.drive) for source in sources.all]
     held, fit = motions[-1], motions[:-1]
     problems = [text for motion in motions for text in _untold_torque(motion)]
+    problems += [text for source in sources.all for text in _uncounted(source.drive)]
     problems += _stillness(fit, held, car)
-    warnings = _excitation(fit, car)
+    warnings = _excitation(fit, [source.drive for source in sources.fit], car)
     of_mass = {motion.name: mass for motion in motions if (mass := _mass(motion)) is not None}
     refused, warned = _masses(of_mass, car)
     of_radius, warned_of_radius = _radii(motions, car)
     problems += [*refused, *of_radius]
     if problems:
         raise LogError("\n".join(problems))
+    if not warned:  # the regression says the same with a mass
+        warned = _contradictions(motions, car)
     return (*warnings, *warned, *warned_of_radius, *_shared(sources))
 
 
-def _car(model: Simulation, source: Source) -> Car:
-    parameters, _ = model.setup(source.road)
+def contradiction(model: Simulation, drive: Drive, whole: bool = True) -> str | None:
+    """The sentence that a drive's torque and acceleration are not of this car; None where they may be.
+
+    Parameters
+    ----------
+    model, drive : Simulation, Drive
+        The car and one drive.
+    whole : bool
+        Whether the torque of all wheels is measured; without it too little torque is no contradiction.
+    """
+    car = _car(model, drive.road)
+    motion = _motion(model, car, drive)
+    return None if motion.silent else _contradicted([motion], car, whole)
+
+
+def _contradictions(motions: Sequence[Motion], car: Car) -> list[str]:
+    """The same of each log, or of all together where each is too short."""
+    told = [motion for motion in motions if not motion.silent]
+    each = [(motion.name, text) for motion in told if (text := _contradicted([motion], car))]
+    if each:
+        texts = dict.fromkeys(text for _, text in each)
+        return [f"{', '.join(name for name, t in each if t == text)}: {text}" for text in texts]
+    text = _contradicted(told, car)
+    return [f"All logs together: {text}"] if text else []
+
+
+def _contradicted(motions: Sequence[Motion], car: Car, whole: bool = True) -> str | None:
+    """Where most of the driven, or of the braked samples ask for a mass beyond `PLAUSIBLE`, whatever slope and drag.
+
+    No regression, so that few samples are enough, and no drag of a wrong sign can take what the torque has too much.
+    """
+    if not motions:
+        return None
+    change = np.concatenate([motion.accel_m_s2 for motion in motions])
+    asked = np.concatenate([motion.force_n for motion in motions]) / car.mass_kg
+    for sign, does, by in ((1.0, "accelerate", "accelerates"), (-1.0, "slow down", "slows down")):
+        taken = np.maximum(sign * asked, sign * change) > ROLLS_M_S2
+        if np.count_nonzero(taken) < FEWEST_EACH:
+            continue
+        a, f = sign * change[taken], sign * asked[taken]
+        more = np.mean(f - ROLLS_M_S2 > PLAUSIBLE[1] * np.maximum(a, 0.0)) > 0.5
+        less = whole and np.mean(f + ROLLS_M_S2 < PLAUSIBLE[0] * a) > 0.5
+        if more or less:
+            others = ", or brake torque is missing or only demanded" if sign < 0.0 else ""
+            return (
+                f"The logged torque would {does} this car at {np.median(f):.2g} m/s2 where it {by} at "
+                f"{np.median(a):.2g} m/s2: torque scale, gear or mass is wrong{others}."
+            )
+    return None
+
+
+def _car(model: Simulation, road: RoadFile) -> Car:
+    parameters, _ = model.setup(road)
     (gain,) = EFFECTS["torque_gain"].parameters()
     low, high = gain.bounds(model.vehicle.to_core())
     return Car(
@@ -172,8 +228,7 @@ def _car(model: Simulation, source: Source) -> Car:
     )
 
 
-def _motion(model: Simulation, car: Car, source: Source) -> Motion:
-    drive = source.drive
+def _motion(model: Simulation, car: Car, drive: Drive) -> Motion:
     columns = {name: drive.measured[:, i] for i, name in enumerate(CHANNELS)}
     columns = model.corrected(drive.time_s, columns)
     torque_nm = model.actuated(drive.time_s, drive.torque_nm)
@@ -190,7 +245,7 @@ def _motion(model: Simulation, car: Car, source: Source) -> Motion:
     taken = np.flatnonzero(whole)[::rows]
     silent = bool(np.all(np.ptp(drive.torque_nm, axis=0) <= 1e-3 * model.vehicle.motor_peak_torque_nm))
     return Motion(
-        source.log.name,
+        drive.name,
         v[taken],
         change[taken],
         force[taken],
@@ -248,6 +303,16 @@ def _untold_torque(motion: Motion) -> list[str]:
     ]
 
 
+def _uncounted(drive: Drive) -> list[str]:
+    """A log whose car moves only while the observer settles: nothing of it can be compared."""
+    if np.any(drive.moving & (drive.time_s >= drive.time_s[0] + SETTLING_S)):
+        return []
+    return [
+        f"{drive.name}: the car moves only in the first {SETTLING_S:g} s, which are not compared with the simulation; "
+        "expected a log of driving."
+    ]
+
+
 def _is_still(motion: Motion, car: Car) -> bool:
     return bool(
         len(motion.accel_m_s2) >= 2
@@ -269,23 +334,23 @@ def _stillness(fit: Sequence[Motion], held: Motion, car: Car) -> list[str]:
     ]
 
 
-def _regimes(fit: Sequence[Motion], car: Car) -> dict[str, float]:
-    """Time of the fit logs in each regime [s]."""
-    share = np.concatenate([motion.force_n for motion in fit]) / car.weight_n
-    counts = {
-        "driving": np.count_nonzero(share > DRIVING),
-        "braking": np.count_nonzero(share < -DRIVING),
-        "coasting": np.count_nonzero(np.abs(share) <= DRIVING),
-    }
-    return {name: count * HALF_S for name, count in counts.items()}
+def _regimes(fit: Sequence[Drive], car: Car) -> dict[str, float]:
+    """Time of the fit logs in each regime by the torque alone, which needs no smoothing [s]."""
+    held = dict.fromkeys(("driving", "braking", "coasting"), 0.0)
+    for drive in fit:
+        share = drive.torque_nm[drive.moving].sum(axis=1) / (car.radius_m * car.weight_n)
+        held["driving"] += np.count_nonzero(share > DRIVING) * drive.step_s
+        held["braking"] += np.count_nonzero(share < -DRIVING) * drive.step_s
+        held["coasting"] += np.count_nonzero(np.abs(share) <= DRIVING) * drive.step_s
+    return held
 
 
-def _excitation(fit: Sequence[Motion], car: Car) -> list[str]:
+def _excitation(fit: Sequence[Motion], drives: Sequence[Drive], car: Car) -> list[str]:
     """What the fit logs together do not excite."""
     accel = np.concatenate([motion.accel_m_s2 for motion in fit])
     if len(accel) < 2:
         return []
-    held = [name for name, time_s in _regimes(fit, car).items() if time_s >= REGIME_S]
+    held = [name for name, time_s in _regimes(drives, car).items() if time_s >= REGIME_S]
     deviation = float(np.std(accel))
     what = []
     if len(held) == 1:

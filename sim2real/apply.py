@@ -196,7 +196,7 @@ def _effect(cause: Cause) -> Effect:
 
 
 def gap_left(diagnosis: Diagnosis, causes: Sequence[Cause]) -> float:
-    """The gap on the hold-out with these causes of `chosen` [noise floors]."""
+    """The gap on the hold-out with these causes of `chosen` [sensor noises]."""
     return diagnosis.gap.after.total if tuple(causes) == added(diagnosis) else causes[0].gap_after
 
 

@@ -106,7 +106,7 @@ class Cause:
     parameters : dict
         Parameter name to its estimate.
     gap_after : float
-        Gap that is left on the hold-out with this effect alone [noise floors].
+        Gap that is left on the hold-out with this effect alone [sensor noises].
     shrink_percent : Interval
         By how much the hold-out's gap shrinks with it alone [%].
     fit_bic : float
@@ -231,7 +231,7 @@ class OwnParameter:
     share : float
         What it takes of the fit logs' loss beyond noise, by its linear response [-].
     gap_after : float or None
-        Gap on the hold-out with the unit run at the estimate [noise floors]; None where it was not run.
+        Gap on the hold-out with the unit run at the estimate [sensor noises]; None where it was not run.
     """
 
     name: str
@@ -257,7 +257,7 @@ class OwnFinding:
     effect : str
         The library's effect that it was run with; empty where nothing of it stands for the best one.
     gap_after : float or None
-        Gap on the hold-out with that effect [noise floors].
+        Gap on the hold-out with that effect [sensor noises].
     sentence : str
         All this in words.
     """
@@ -322,6 +322,8 @@ class Diagnosis:
     next_manoeuvre: NextManoeuvre | None = None
     unexplained: Unexplained | None = None
     """What is left where no effect explains the gap (`unknown`), or beside the effect (`partial`)."""
+    advice: str = ""
+    """What to try where no effect is named but one comes near."""
     build: dict[str, float] = field(default_factory=dict)
     """Differences of the car's build beside the effect: change to its size, see docs/theory/diagnosis.md."""
     budget: Budget | None = None
@@ -356,6 +358,7 @@ class Diagnosis:
             "cannot_rule_out": list(self.cannot_rule_out),
             "next_manoeuvre": _profile(self.next_manoeuvre),
             "unexplained": _term(self.unexplained),
+            "advice": self.advice,
             "build": self.build,
             "budget": None if self.budget is None else self.budget.to_json(),
             "budget_intervals": None if self.budget is None else self.budget.intervals(),

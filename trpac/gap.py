@@ -51,7 +51,7 @@ class Diagnosis:
 
     @property
     def gap(self) -> Gap:
-        """The gap on the hold-out log before and after, in noise floors."""
+        """The gap on the hold-out log before and after, in units of the sensor noise."""
         return self.result.gap
 
     @property

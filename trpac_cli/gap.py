@@ -238,7 +238,7 @@ def _applied(diagnosis: Diagnosis, causes: tuple[Cause, ...], out: Path) -> Iter
         yield f"{cause.effect}{form}: {values}"
     yield (
         f"Gap on the hold-out: {gap.before.total:.2f} before, {gap_left(diagnosis, causes):.2f} with {names}; "
-        f"noise alone {gap.noise_floor:.2f}."
+        f"noise alone leaves {gap.noise_floor:.2f}."
     )
     budget = diagnosis.budget.shares if diagnosis.budget else {}
     if "structure" in budget and diagnosis.verdict == "partial":
@@ -389,10 +389,10 @@ def _summarise(console: Terminal, diagnosis: Diagnosis) -> None:
     from sim2real.result import added
 
     gap = diagnosis.gap
-    sizes = f"gap {gap.before.total:.2f}"
+    sizes = f"In units of the sensor noise: gap {gap.before.total:.2f}"
     if added(diagnosis):
         sizes += f", with {' and '.join(c.effect for c in added(diagnosis))} {gap.after.total:.2f}"
-    sizes += f"; noise alone {gap.noise_floor:.2f}"
+    sizes += f"; noise alone leaves {gap.noise_floor:.2f}"
     if parts := budget_parts(diagnosis):
         sizes += (
             f"\nof the squared gap: {', '.join(f'{part.name} {percent(part.share.value)}' for part in parts)}"
@@ -406,6 +406,8 @@ def _summarise(console: Terminal, diagnosis: Diagnosis) -> None:
         console.print(_cause_table(diagnosis))
     if diagnosis.next_manoeuvre is not None:
         console.print(f"To separate them: {diagnosis.next_manoeuvre.sentence}")
+    if diagnosis.advice:
+        console.print(f"To try: {diagnosis.advice}")
     for warning in diagnosis.warnings:
         console.print(warning, style="yellow")
 

@@ -48,6 +48,10 @@ def check(
         list[Path] | None,
         typer.Option(help="DBC file of a raw bus log; may be repeated."),
     ] = None,
+    vehicle: Annotated[
+        Path | None,
+        typer.Option(help="Car file: the logged torque is compared with the car's acceleration."),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -108,7 +112,15 @@ def check(
     lacks = missing_for_estimate(found)
     fit = not found.problems and not lacks
     usable = "usable" if fit else "not usable, see above"
-    console.print(f"For trpac estimate: {usable}.")
+    try:
+        apart = _torque_apart(found, vehicle) if fit and vehicle is not None else None
+    except TrpacError as error:
+        refuse(COMMAND, error)
+    if apart:
+        console.print(apart, style="yellow")
+        usable = "readable, but the torque does not fit the car"
+    hint = " With --vehicle the torque is compared with the car." if fit and vehicle is None else ""
+    console.print(f"For trpac estimate: {usable}.{hint}")
     if fit:
         console.print(f"For trpac gap diagnose: {'; '.join(missing_for_diagnosis(found)) or 'usable'}.")
     try:
@@ -136,6 +148,14 @@ def check(
         if out is not None:
             console.print(f"{out} was not written: see the problems above.", style="red")
         raise typer.Exit(EXIT_NOT_ENOUGH)
+
+
+def _torque_apart(found: Understood, vehicle: Path) -> str | None:
+    """The sentence that the torque does not fit the car; None where it may."""
+    from scenarios.files import load_vehicle
+    from sim2real.replay.inputs import make_inputs
+
+    return make_inputs(found.log(lambda: ""), load_vehicle(vehicle)).contradiction
 
 
 def _show(console: Terminal, found: Understood) -> None:

@@ -32,7 +32,7 @@ def budget(
     model : Simulation
         The car as simulated.
     floor : float
-        The gap that noise alone leaves [noise floors].
+        The gap that noise alone leaves [sensor noises].
     seed : int
         Of the resampling.
     """

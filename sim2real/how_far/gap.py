@@ -43,7 +43,11 @@ def measure(evidence: Evidence, rests: Sequence[Array]) -> Measure:
 
 
 def noise_floor(model: Simulation, evidence: Evidence, seed: int) -> float:
-    """What `measure` gives where the model is right: a free run of the model itself with fresh noise, followed."""
+    """What `measure` gives where the model is right: a free run of the model itself with fresh noise, followed.
+
+    About 1; more where the logged torque spins up or locks the wheels of the free run from its start on: single samples
+    then tell its state no better than to many times the noise.
+    """
     generator = np.random.default_rng(seed)
     rests = []
     for drive, noise in zip(evidence.drives, evidence.noises, strict=True):
@@ -62,6 +66,8 @@ def shrink(evidence: Evidence, before: Sequence[Array], after: Sequence[Array], 
     weights_before, counts = block_squares(evidence, before)
     weights_after, _ = block_squares(evidence, after)
     blocks = len(counts)
+    if not blocks:
+        return Interval(float("nan"), float("nan"), float("nan"), "%")
     generator = np.random.default_rng(seed)
     values = []
     for rows in generator.integers(0, blocks, (BOOTSTRAP, blocks)):
@@ -82,12 +88,18 @@ def energy(squares: Array, counts: Array) -> float:
 
 
 def block_squares(evidence: Evidence, rests: Sequence[Array]) -> tuple[Array, Array]:
-    """Per block and signal, shape (blocks, signals): sums of squares in units of the noise, and how many samples."""
+    """Per block and signal, shape (blocks, signals): sums of squares in units of the noise, and how many samples.
+
+    A block without any sample that counts, as of a standing car, is left out: a resampling of such blocks has no gap.
+    """
     squares, counts = [], []
     for drive, noise, rest in zip(evidence.drives, evidence.noises, rests, strict=True):
         z, length = noise.scaled(rest), drive.rows_in(BLOCK_S)
         for at in range(0, len(drive), length):
             parts = [z[at : at + length, GROUPS[name]] for name in GAP_SIGNALS]
-            squares.append([np.nansum(part**2) for part in parts])
-            counts.append([np.isfinite(part).sum() for part in parts])
-    return np.array(squares), np.array(counts, dtype=np.float64)
+            count = [np.isfinite(part).sum() for part in parts]
+            if any(count):
+                squares.append([np.nansum(part**2) for part in parts])
+                counts.append(count)
+    shape = (-1, len(GAP_SIGNALS))
+    return np.array(squares).reshape(shape), np.array(counts, dtype=np.float64).reshape(shape)

@@ -68,6 +68,7 @@ def estimate_log(
         read, inputs, car, lens, networks_folder(), lambda done, total: told("pictures", done, total)
     )
     done = replay(inputs, seen, peers, told, method)
+    apart = (f"{inputs.contradiction} The estimate cannot be trusted.",) if inputs.contradiction else ()
     assumed = (
         f"no vehicle file was given (--vehicle): the car is assumed to be {car.name} of {TABLE_3.name}.",
     )
@@ -95,7 +96,14 @@ def estimate_log(
         "excitation": excitation(done),
         "estimate": _outcome(done),
         "errors": errors(done),
-        "warnings": [*(assumed if guessed else ()), *inputs.warnings, *seen.warnings, *done.messages],
+        "torque_fits_car": not apart,
+        "warnings": [
+            *apart,
+            *(assumed if guessed else ()),
+            *inputs.warnings,
+            *seen.warnings,
+            *done.messages,
+        ],
         "versions": {name: version(name) for name in PACKAGES},
     }
     return done, summary

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from scenarios.effects.base import mean_of_wheels
 from scenarios.files import RoadFile, RoadSegment, VehicleFile
+from sim2real.adequacy import contradiction
 from sim2real.logs import Log, LogError, resample, with_way
 from sim2real.observing.drive import ACCEL, CHANNELS, SPEED, WHEEL, Drive, make_drive
 from sim2real.observing.noise import RESOLUTION
@@ -72,6 +73,8 @@ class Inputs:
         Of the speeds.
     warnings : tuple of str
         What was made of the log, in sentences.
+    contradiction : str or None
+        The sentence that the torque does not fit the car, see `sim2real.adequacy.contradiction`.
     """
 
     vehicle: Vehicle
@@ -86,6 +89,7 @@ class Inputs:
     mu_reference: Array | None
     noise: Noise
     warnings: tuple[str, ...]
+    contradiction: str | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -175,6 +179,9 @@ def make_inputs(log: Log, vehicle: VehicleFile) -> Inputs:
         mu_reference=signals.get("mu_reference"),
         noise=_noise(drive, wheels, speed, car.wheel_radius_m),
         warnings=_warnings(log, locked, step_s),
+        contradiction=contradiction(
+            model, drive, whole=not any(name.startswith("wheel_torque") for name in log.derived)
+        ),
     )
     moved_s = np.count_nonzero(made.moving) * step_s
     if moved_s < LEAST_MOVING_S:

@@ -92,11 +92,13 @@ def verdict(summary: dict[str, Any]) -> str:
 
 
 def sentences(summary: dict[str, Any]) -> list[str]:
-    """The estimate at the end; how much the tyres showed; how far the estimate is off a reference."""
+    """Whether the estimate can be trusted; the estimate at the end; what the tyres showed; its errors."""
     said, driven, method = summary["excitation"], summary["estimate"], Method.of(summary["method"])
     theta, std, low, high = (driven[f"{n}_end"] for n in ("TRPAC", "TRPAC_std", "TRPAC_low", "TRPAC_high"))
     first, *wide = known.sentences(theta, std, *known.interval(method, theta, std, low, high))
     found = [f"At the end: {first}", *wide]
+    if not summary.get("torque_fits_car", True):
+        found[0] = f"The estimate cannot be trusted: the logged torque does not fit the car. {found[0]}"
     share = percent(said["seen_share"])
     shown = f"The car drove for {said['driven_s']:.1f} s; the tyres showed the road for {share} of it"
     if not said["excited_share"]:

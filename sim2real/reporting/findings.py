@@ -23,6 +23,7 @@ from sim2real.observing.orders import Order
 from sim2real.observing.orders import characterise as swing_in_words
 from sim2real.observing.robust import loss
 from sim2real.reporting import sentences
+from sim2real.reporting.advice import advice
 from sim2real.reporting.estimates import is_excited, joint
 from sim2real.result import (
     Cause,
@@ -108,7 +109,9 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
             for part in (
                 sentences.verdict(decision, gap, causes),
                 unexplained.sentence if unexplained else "",
-                "" if found.only_order else sentences.nearest(decision, found.contest),
+                ""
+                if found.only_order
+                else sentences.nearest(decision, found.contest, found.fit_to, found.holdout),
                 swing.sentence if swing and unexplained is not swing else "",
             )
             if part
@@ -121,6 +124,7 @@ def describe(found: Findings, *, seed: int, jobs: int, progress: Progress) -> Di
         cannot_rule_out=tuple(c.effect for c in causes if not c.excited),
         next_manoeuvre=_next(found, progress),
         unexplained=unexplained,
+        advice="" if found.only_order else advice(decision, found.contest),
         build=dict(decision.build),
         budget=None
         if decision.verdict is Verdict.NO_GAP

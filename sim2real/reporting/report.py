@@ -192,7 +192,7 @@ def apply_command(diagnosis: Diagnosis) -> str:
 
 
 def signal_rows(gap: Gap) -> list[tuple[str, float, float | None, str, float | None, float | None]]:
-    """Per signal and of all: its name, gap before and after [noise floors], its unit, the same two in that unit."""
+    """Per signal and of all: its name, gap before and after [sensor noises], its unit, the same two in that unit."""
     rows: list[tuple[str, float, float | None, str, float | None, float | None]] = [
         ("all", gap.before.total, gap.after.total, "", None, None)
     ]

@@ -86,7 +86,7 @@ def _span(x: Array, y: Array) -> str:
 def seen_alone(term: Unexplained, before: Measure) -> Unexplained:
     """A gap that one kind of sensor alone shows, and that no term explains, is that sensor's: a force moves the car.
 
-    `before` is the gap as simulated [noise floors].
+    `before` is the gap as simulated [sensor noises].
     """
     if term.share >= SLIGHT:
         return term

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 
 import numpy as np
@@ -141,6 +142,29 @@ class TestExcitation:
         other = three()[1]
         assert require_adequate(sources(three(torque_of, speed_m_s)[0], other, three()[2])) == ()
 
+    def test_a_car_that_stands_from_the_first_moments_on_is_refused(self, sources):
+        def stopped(drive):
+            return {"vehicle_speed_m_s": np.maximum(0.75 - drive.time_s, 0.0)}
+
+        with pytest.raises(LogError, match=r"held.csv: the car moves only in the first 0.3 s"):
+            require_adequate(sources(*three(), columns=stopped))
+
+    def test_of_both_in_short_windows_is_not_said_to_be_one(self, sources):
+        """A launch from standstill, and then a lift: each is shorter than what smoothing takes off its ends."""
+        lively = lambda duration_s: trace(  # noqa: E731
+            (0.0, 500.0), (1.4, 500.0), (1.5, -70.0), (2.8, -70.0), duration_s=duration_s
+        )
+        for drives in (
+            [noisy(clean(lively(2.8), 3.0), 0), three()[2]],
+            [
+                noisy(clean(trace((0.0, 500.0), (2.0, 300.0), duration_s=2.0), 3.0), 0),
+                noisy(clean(trace((0.0, -70.0), duration_s=2.0), 15.0), 1),
+                three()[2],
+            ],
+        ):
+            told = require_adequate(sources(*drives))
+            assert not any("contain only" in text for text in told), told
+
 
 class TestTorque:
     @pytest.mark.parametrize("value", [0.0, 55.0])
@@ -176,6 +200,54 @@ class TestTorque:
             sources(*three(), columns=lambda drive: torques(np.maximum(drive.torque_nm[:, 0], -40.0)))
         )
         assert any("the logged torque in braking is 0." in text for text in told)
+
+
+class TestForceBalance:
+    """Torque that asks for another acceleration than the car's, in logs too short for a regression of the mass."""
+
+    SAID = (
+        r"The logged torque would accelerate this car at 1\d m/s2 where it accelerates at [45]\.?\d* m/s2: "
+        r"torque scale, gear or mass is wrong\."
+    )
+
+    def launch(self, duration_s=5.0):
+        """Torque that falls with speed, as an engine's does, so that a drag of a wrong sign would fit as well."""
+        return trace((0.0, 560.0), (3.5, 440.0), (3.8, -70.0), (5.0, -70.0), duration_s=duration_s)
+
+    def scaled(self, factor):
+        return lambda drive: torques(factor * drive.torque_nm[:, 0])
+
+    def falling(self, drive):
+        """3.3 to 1.9 times the torque in driving, and the torque itself in coasting."""
+        factor = np.interp(drive.time_s, [0.0, 3.5, 3.8], [3.3, 1.9, 1.0])
+        return torques(factor * drive.torque_nm[:, 0])
+
+    def drives(self, duration_s=5.0):
+        return [noisy(clean(self.launch(duration_s), 3.0 + seed), seed) for seed in range(3)]
+
+    def test_is_said_of_one_short_log(self, sources):
+        (told,) = require_adequate(sources(*self.drives(), columns=self.falling))
+        assert re.fullmatch(r"a\.csv, b\.csv, held\.csv: " + self.SAID, told), told
+
+    def test_is_said_of_several_too_short_ones_together(self, sources):
+        (told,) = [
+            text
+            for text in require_adequate(sources(*self.drives(2.2), columns=self.scaled(2.5)))
+            if "contain only" not in text
+        ]
+        assert re.fullmatch(f"All logs together: {self.SAID}", told), told
+
+    @pytest.mark.parametrize("factor", [0.8, 1.0, 1.3])
+    def test_is_not_said_of_what_a_calibration_or_payload_does(self, sources, factor):
+        told = require_adequate(sources(*self.drives(), columns=self.scaled(factor)))
+        assert not any("would accelerate" in text for text in told), told
+
+    def test_too_little_torque_is_said_too(self, sources):
+        told = require_adequate(sources(*self.drives(2.2), columns=self.scaled(0.2)))
+        assert any(
+            re.search(r"would accelerate this car at [01]\.\d+ m/s2 where it accelerates at [45]", text)
+            for text in told
+        ), told
 
 
 class TestAnotherCar:

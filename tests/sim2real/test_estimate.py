@@ -1,6 +1,7 @@
 """`trpac estimate`: from a recorded log to estimates, report and summary; and what it refuses."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 import schemas
+from gap_drives import clean, noisy, trace
+from gap_files import write_log as write_drive
 from log_maker import make_frame, save
 from report_page import require_report
 from typer.testing import CliRunner
@@ -189,6 +192,26 @@ class TestCommand:
         assert result.exit_code == 0, result.output
         one, other = (pd.read_csv(f / "estimates.csv")["TRPAC"] for f in (estimated[0], tmp_path / "o"))
         assert one.to_numpy() == pytest.approx(other.to_numpy(), abs=1e-5)
+
+    @pytest.mark.parametrize("factor", [1.0, 2.5])
+    def test_torque_of_another_car_is_the_first_thing_said(self, factor, tmp_path):
+        """A launch at 5 m/s2 whose torque is logged 2.5 times too large."""
+        car = load_vehicle(TABLE_3)
+        torque = trace((0.0, 560.0), (3.5, 440.0), (3.8, -70.0), (6.0, -70.0), duration_s=6.0)
+        driven = noisy(clean(torque, 3.0, car=car), 0)
+        logged = {f"wheel_torque_{w}_nm": factor * driven.torque_nm[:, i] for i, w in enumerate(WHEELS)}
+        write_drive(driven, tmp_path / "drive.csv", **logged)
+        done = trpac.estimate(tmp_path / "drive.csv", TABLE_3)
+        said = "The estimate cannot be trusted"
+        assert done.verdict.startswith(said) == (factor > 2.0)
+        assert done.summary["torque_fits_car"] == (factor < 2.0)
+        assert any(said in text for text in done.warnings) == (factor > 2.0)
+        if factor > 2.0:
+            assert re.fullmatch(
+                r"The logged torque would accelerate this car at 1\d m/s2 where it accelerates at [45]\.?\d* m/s2: "
+                r"torque scale, gear or mass is wrong\. The estimate cannot be trusted\.",
+                done.warnings[0],
+            )
 
     def test_a_guessed_car_is_said(self, tmp_path):
         result = run(save(make_frame(duration_s=2.5), tmp_path / "d.csv"), "--out", tmp_path / "out")

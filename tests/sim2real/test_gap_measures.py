@@ -132,6 +132,28 @@ def test_the_shrinks_interval_holds_the_true_shrink(tame):
     assert inside >= 25
 
 
+@pytest.mark.filterwarnings("error")
+def test_seconds_in_which_nothing_counts_are_not_resampled(tame):
+    """A hold-out that is mostly standing: with its empty blocks, some resamplings would have no gap at all."""
+    held = known(tame)
+    before = np.ones((len(tame), 7)) * SIGMA
+    before[150:] = np.nan
+    found = gap.shrink(held, [2.0 * before], [before], seed=0)
+    assert (found.value, found.low, found.high) == pytest.approx((50.0, 50.0, 50.0))
+    assert len(gap.block_squares(held, [before])[1]) < 8.0 / gap.BLOCK_S
+    nothing = gap.shrink(held, [np.nan * before], [np.nan * before], seed=0)
+    assert np.isnan([nothing.value, nothing.low, nothing.high]).all()
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_budget_of_a_hold_out_that_mostly_stands_has_shares(tame):
+    moving = tame.moving & (tame.time_s < tame.time_s[0] + 1.5)
+    held = known(replace(tame, moving=moving))
+    shares = budget(held, [MassOffset(150.0)], MODEL, 1.0, seed=0).shares
+    assert sum(share.value for share in shares.values()) == pytest.approx(1.0)
+    assert all(np.isfinite([share.low, share.high]).all() for share in shares.values())
+
+
 def test_the_interval_of_a_shrink_is_the_seeds(tame):
     held = known(tame)
     before, after = held.residuals(MODEL.with_effects(MassOffset(150.0))), held.residuals(MODEL)

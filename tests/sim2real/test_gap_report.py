@@ -12,16 +12,21 @@ from pathlib import Path
 import made_up_diagnosis as made_up
 import numpy as np
 import pytest
+from gap_drives import MODEL
 from hypothesis import given
 from hypothesis import strategies as st
 from report_page import Page, require_report
 
+from scenarios.effects import EFFECTS
 from scenarios.html_page import percent
 from sim2real.how_far.rating import LEAST_SAMPLES, MOST_SAMPLES, rating
-from sim2real.hypotheses.contest import Entry
+from sim2real.hypotheses.contest import Contest, Entry
+from sim2real.hypotheses.fitting import Candidate, Fit
 from sim2real.hypotheses.goodness import Fitness
 from sim2real.hypotheses.selection import Decision
+from sim2real.observing.robust import loss
 from sim2real.reporting import figures, report, sentences
+from sim2real.reporting.advice import TRIES, advice
 from sim2real.reporting.report import estimate, jsonable, render, write_diagnosis
 from sim2real.result import Interval, Measure, Trace, Verdict
 
@@ -68,7 +73,64 @@ def test_a_sentence_lists_a_few_rivals_and_counts_the_others(rivals, said):
     fitness = Fitness(1.0, {})
     decision = Decision(Verdict.AMBIGUOUS, best, tuple(others), {}, fitness, fitness)
     diagnosis = BRIEF["ambiguous"]
-    assert said in sentences.verdict(decision, diagnosis.gap, diagnosis.causes)
+    told = sentences.verdict(decision, diagnosis.gap, diagnosis.causes)
+    assert said in told
+    assert f"a gap of {diagnosis.gap.before.total:.1f} times the sensor noise" in told.replace(
+        "The gap", "a gap"
+    )
+
+
+class TestWhatComesNearest:
+    """Of a gap that no effect is named for."""
+
+    def contest(self, left, ids=("torque_gain",), x=(0.4012,)):
+        """One entry that leaves so much of each residual, of 100 in the model as it is."""
+        candidate, z = Candidate(MODEL, ids), np.full(1000, 100.0)
+        found = Fit(candidate, np.array(x), left * z, loss(left * z), np.zeros((0, 0)), 0)
+        entry = Entry(ids, found, left * z, np.zeros(0))
+        contest = Contest(Entry((), None, z, np.zeros(0)), (entry,))
+        decision = Decision(Verdict.UNKNOWN, entry, (), {}, Fitness(90.0, {}), Fitness(1.0, {}))
+        return decision, contest
+
+    def test_it_says_what_to_try(self):
+        said = advice(*self.contest(0.05, ("torque_gain", "torque_lag"), (0.4012, 0.3173)))
+        assert said == (
+            "Multiply the wheel torque by about 0.4 in the mapping file (scale), or check the torque's unit, the gear "
+            "and mass_kg. Check whether the logged torque is a demand that the actuators follow with a time constant "
+            "of about 0.32 s. Then diagnose again."
+        )
+        page = render(replace(BRIEF["unknown"], advice=said))
+        assert "Multiply the wheel torque by about 0.4 in the mapping file (scale)" in page
+        assert json.loads(json.dumps(replace(BRIEF["unknown"], advice=said).to_json()["advice"])) == said
+
+    def test_not_where_it_leaves_more_than_a_tenth_or_is_named(self):
+        decision, contest = self.contest(0.15)
+        assert sentences.closest(decision, contest) is not None
+        assert advice(decision, contest) == ""
+        decision, contest = self.contest(0.05)
+        assert advice(replace(decision, verdict=Verdict.IDENTIFIED), contest) == ""
+
+    def test_every_effect_that_can_be_nearest_has_its_sentence(self):
+        nearest = {key: effect for key, effect in EFFECTS.items() if effect.stage != "perception"}
+        assert set(TRIES) == {key for key, effect in nearest.items() if not effect.structural} | {
+            "tyre_load_stiffness"
+        }
+        for key, text in TRIES.items():
+            values = {p.name: "1.5" for p in nearest[key].parameters()}
+            assert "1.5" in text.format(**values)
+            assert not text.endswith(".")
+
+    @pytest.mark.parametrize(
+        ("misfit", "count", "said"),
+        [
+            (52.6, 1, "what it leaves is not noise (52.6 times what noise gives)"),
+            (1.2, 1, "another fault explains the gap better"),
+            (1.2, 2, "one of its effects alone explains nearly as much, or the two only cancel each other"),
+            (1.45, 2, "what it leaves is not noise (1.4 times what noise gives)"),
+        ],
+    )
+    def test_it_says_why_it_is_not_named(self, misfit, count, said):
+        assert sentences.why_not(misfit, 30.0, count) == said
 
 
 @pytest.mark.parametrize("name", DIAGNOSES)

@@ -160,8 +160,8 @@ def partial() -> Diagnosis:
     return replace(
         identified(),
         verdict=Verdict.PARTIAL,
-        sentence="A part of the gap of 4.1 times the noise floor is mass_offset (mass_kg 180 kg): it takes the gap "
-        "from 4.1 to 2.5 times the noise floor.",
+        sentence="A part of the gap of 4.1 times the sensor noise is mass_offset (mass_kg 180 kg): it takes the gap "
+        "from 4.1 to 2.5 times the sensor noise.",
         gap=replace(
             identified().gap, after=Measure(2.5, {"wheel_speed": 4.0, "vehicle_speed": 1.0, "accel_x": 1.1})
         ),
@@ -236,8 +236,8 @@ def unknown() -> Diagnosis:
     return replace(
         identified(),
         verdict=Verdict.UNKNOWN,
-        sentence="There is a gap of 4.1 noise floors and no effect of the library explains it: the force balance "
-        "lacks a force that opposes motion and grows with speed.",
+        sentence="There is a gap of 4.1 times the sensor noise, and no effect of the library explains it: "
+        "the force balance lacks a force that opposes motion and grows with speed.",
         gap=Gap(before, before, 1.0),
         causes=_causes(
             ("aero_drag", 0.05, {"drag_area_m2": Interval(0.9, 0.8, 1.0, "m^2")}, 2.9, 29.0), *OTHERS[:2]

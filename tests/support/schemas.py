@@ -48,7 +48,7 @@ def loosened(schema: Any) -> Any:
     kept = {
         key: loosened(part) for key, part in schema.items() if key != "required" or isinstance(part, dict)
     }
-    if isinstance(kept.get("type"), str):
+    if isinstance(kept.get("type"), str) and kept["type"] != "null":
         kept["type"] = ["null", "number" if kept["type"] == "integer" else kept["type"]]
     return kept
 

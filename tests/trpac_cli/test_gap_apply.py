@@ -91,7 +91,7 @@ class TestApplied:
             k: v for k, v in was.items() if k != "effects"
         }
         text = words(result.stdout)
-        assert f"Gap on the hold-out: {left}; noise alone 1.00." in text
+        assert f"Gap on the hold-out: {left}; noise alone leaves 1.00." in text
         assert f"trpac gap diagnose --vehicle {out}" in text
         assert result.stdout.strip().endswith(str(out))
         assert [p.name for p in out.parent.iterdir()] == ["car.yaml"]

@@ -3,7 +3,10 @@
 import cv2
 import numpy as np
 import pytest
+import yaml
 from command_line import run, words
+from gap_drives import BARE, clean, noisy, trace
+from gap_files import write_log
 from log_maker import make_frame, save
 
 import trpac
@@ -40,6 +43,21 @@ def test_a_plain_log_is_fit(frame, tmp_path):
     assert "301 rows, read as: plain table" in text
     assert "For trpac estimate: usable." in text
     assert "For trpac gap diagnose: usable." in text
+
+
+@pytest.mark.parametrize("factor", [1.0, 2.5])
+def test_with_a_car_file_the_torque_is_compared(factor, tmp_path):
+    driven = noisy(clean(trace((0.0, 560.0), (3.5, 440.0), (5.0, 0.0), duration_s=5.0), 3.0))
+    logged = {f"wheel_torque_{w}_nm": factor * driven.torque_nm[:, i] for i, w in enumerate(WHEELS)}
+    write_log(driven, tmp_path / "log.csv", **logged)
+    (tmp_path / "car.yaml").write_text(yaml.safe_dump(BARE.model_dump(by_alias=True)), encoding="utf-8")
+    done = run("log", "check", tmp_path / "log.csv", "--vehicle", tmp_path / "car.yaml")
+    assert done.exit_code == 0, done.output
+    text = words(done.output)
+    assert ("For trpac estimate: usable." in text) == (factor == 1.0)
+    assert ("readable, but the torque does not fit the car" in text) == (factor > 1.0)
+    assert ("The logged torque would accelerate this car at 1" in text) == (factor > 1.0)
+    assert "--vehicle" not in text
 
 
 def test_a_mapping_is_proposed_corrected_by_nobody_and_good(frame, german, tmp_path):
