@@ -126,6 +126,11 @@ class Replay:
             "TRPAC_expected_std": expected_std,
         }
 
+    @cached_property
+    def source_of_the_car(self) -> NDArray[np.int_]:
+        """`Source` of all wheels together, shape (n,)."""
+        return np.bitwise_or.reduce(self.source, axis=1)
+
 
 def replay(
     inputs: Inputs,
