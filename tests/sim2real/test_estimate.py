@@ -24,7 +24,7 @@ from sim2real.replay import figures
 from sim2real.replay.camera import camera_side
 from sim2real.replay.estimate import TABLE_3, estimate_log
 from sim2real.replay.inputs import make_inputs, white_noise
-from sim2real.replay.run import OURS, readings, replay
+from sim2real.replay.run import OURS, _trusted, readings, replay
 from sim2real.replay.score import score
 from sim2real.replay.vehicle_level import vehicle_level
 from trpac_cli.main import app
@@ -32,6 +32,7 @@ from trpac_core.car_friction import Friction, car_friction
 from trpac_core.estimator import EstimatorConfig, TrpacEstimator
 from trpac_core.estimator_data import Method
 from trpac_core.four_wheels import FourWheelsConfig
+from trpac_core.robust.messages import WRONG_INPUT
 from trpac_core.vision.classes import Surface
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -342,6 +343,15 @@ class TestInputs:
         rounded = np.round((15.0 + 0.5 * np.sin(t)) / 0.1) * 0.1
         assert white_noise(rounded) == pytest.approx(0.1 / np.sqrt(12.0), rel=0.01)
         assert white_noise(np.ones(100)) == 0.0
+
+
+def test_an_axle_with_wrong_readings_is_given_no_advice():
+    said = {
+        "Front wheels": "Front wheels do not have the expected radius. Adjust it.",
+        "Front tyres": f"Front tyres: {WRONG_INPUT}",
+        "Rear wheels": "Rear wheels do not have the expected radius. Adjust it.",
+    }
+    assert _trusted(said) == (said["Front tyres"], said["Rear wheels"])
 
 
 class TestAxes:
