@@ -247,6 +247,7 @@ def _layout(panel: Panel) -> dict[str, Any]:
         "hovermode": "closest" if any(s.kind == "points" for s in panel.series) else "x",
         "hoverlabel": {"bgcolor": "--ground", "font": {"color": INK.name}},
         "dragmode": "zoom",
+        "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": GREY.name, "activecolor": INK.name},
         "uirevision": "kept",
         "xaxis": x,
         "yaxis": y,

@@ -30,7 +30,8 @@ def estimate(
     mapping: Annotated[
         Path | None,
         typer.Option(
-            "--map", help="Mapping file: where each column of the log format is, and in which unit."
+            "--map",
+            help="Mapping file or name of a shipped one: where each column of the log format is, and its unit.",
         ),
     ] = None,
     dbc: Annotated[

@@ -67,7 +67,9 @@ def diagnose(
     ] = None,
     mapping: Annotated[
         Path | None,
-        typer.Option("--map", help="Names and units of the logs' columns: mapping.yaml."),
+        typer.Option(
+            "--map", help="Names and units of the logs' columns: mapping.yaml, or the name of a shipped one."
+        ),
     ] = None,
     dbc: Annotated[
         list[Path] | None,
@@ -127,7 +129,7 @@ def diagnose(
 
     A mapping file translates other column names and units: schema: 1, and
     under columns: lines such as vehicle_speed_m_s: {column: VehSpd, unit: km/h}.
-    Examples are in sim2real/mappings; docs/guide/logs.md has all options.
+    docs/guide/logs.md has all options and the names of the shipped ones.
 
     A car that differs from the simulated one leaves a gap without any
     fault. --baseline before.csv, any drive before the fault, shows how it

@@ -158,7 +158,7 @@ class TrpacEstimator:
         axle = "Front" if self.config.front_axle else "Rear"
         texts = {
             f"{axle} tyres": tyre_message(state, known, axle, self._known.static_load_n),
-            f"{axle} wheels": radius_message(state, known, axle),
+            f"{axle} wheels": radius_message(state, known, axle, self._known.static_load_n),
         }
         return {about: text for about, text in texts.items() if text is not None}
 

@@ -20,6 +20,7 @@ ROOTS = (
     wheel_step.held,
     messages.learnt_stiffness_n,
     messages.learnt_offset,
+    messages.is_implausible,
     vars(Estimate)["TRPAC_peak"].fget,
 )
 """What the units call of one wheel; all that these need is translated with them."""

@@ -10,12 +10,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
+from scenarios.errors import suggestion
 from scenarios.strict import load_strict
 from sim2real.logs.contract import COLUMNS, IMAGE_PATH, TIME
 from sim2real.logs.errors import LogError
 from sim2real.logs.times import FORMS, SECONDS
 from sim2real.logs.units import factor
+from trpac_core.files import quoted
 
+MAPPINGS = Path(__file__).parents[1] / "mappings"
+"""Folder of the shipped mapping files."""
 BLANKS = "blanks"
 """The separator of columns that any number of blanks stands between."""
 SOURCES = ("column", "constant", "sum", "integrate", "copy")
@@ -236,15 +240,27 @@ MappingFile = create_model(
 )
 
 
-def load_mapping(path: str | Path) -> Mapping:
-    """Read a mapping file; all of its problems in one LogError."""
+def load_mapping(given: str | Path) -> Mapping:
+    """Read a mapping file, or the shipped one of this name; all of its problems in one LogError."""
+    path = _located(Path(given))
     try:
         file = load_strict(path, MappingFile)
     except LogError:
         raise
     except ValueError as error:
         raise LogError(str(error)) from error
-    return mapping_of(file, Path(path))
+    return mapping_of(file, path)
+
+
+def _located(given: Path) -> Path:
+    if given.suffix or len(given.parts) != 1 or given.exists():
+        return given
+    shipped = {path.stem: path for path in sorted(MAPPINGS.glob("*.yaml"))}
+    if given.name not in shipped:
+        raise LogError(
+            f"{quoted(given)}: neither a file nor the name of a shipped mapping; {suggestion(given.name, shipped)}"
+        )
+    return shipped[given.name]
 
 
 def mapping_of(file: BaseModel, path: Path) -> Mapping:

@@ -62,6 +62,17 @@ QUANTITY_WORDS = {
 }
 """Words in the names of columns, by column of the log format, of a wheel's without the wheel: those that speak for it,
 those that do so beside one of them, and those that speak against it."""
+SUM_WORDS = (
+    "torque trq tq moment drehmoment",
+    "engine eng motor brake brk drive powertrain axle bremse antrieb achse",
+    "limit max min steer steering loss friction",
+)
+"""Words of a torque that several wheels share: of a torque, of what makes it, and those that speak against it."""
+SHARES = (
+    "  # SHARE is the wheel's share; those of one column add up to 1 over the four wheels. It is negative for a brake",
+    "  # whose torque is positive where it brakes.",
+)
+"""What to fill in for SHARE."""
 _PER_WORD, _PER_UNIT = 1.0, 1.0
 """Evidence of a word, of which the share of a name's words that are known counts as one more, and of a fitting unit."""
 _WORDS = re.compile(r"[A-ZÄÖÜ]+(?![a-zäöüß])|[A-ZÄÖÜ]?[a-zäöüß]+|\d+")
@@ -105,15 +116,47 @@ def proposed_mapping(table: Table, file: str) -> str:
         "schema: 1",
         "columns:",
     ]
+    shared = shared_torques(table, chosen)
     for name in COLUMNS:
         if name in chosen:
             lines.append(f"  {name}: {_source(name, chosen[name])}")
-        elif name in (*REQUIRED, POSITION) and name not in table.names:
-            where = (
-                "{integrate: {copy: vehicle_speed_m_s}}" if name == POSITION else "{column: NAME, unit: UNIT}"
-            )
-            lines.append(f"  # {name}: {where}   # no column found")
+        elif name == POSITION and name not in table.names:
+            where = "{integrate: {copy: vehicle_speed_m_s}}   # no column found; only needed for a road of"
+            lines.append(f"  # {name}: {where} several stretches")
+        elif name in REQUIRED and name not in table.names:
+            sums = shared if name in _TARGETS and _TARGETS[name][0] == "wheel_torque" else []
+            if sums and not set(SHARES) & set(lines):
+                lines += SHARES
+            where = _sum_of(sums, table) if sums else "{column: NAME, unit: UNIT}   # no column found"
+            lines.append(f"  # {name}: {where}")
     return "\n".join(lines) + "\n"
+
+
+def shared_torques(table: Table, chosen: Pairs[str, Candidate]) -> list[str]:
+    """Columns that may be torques of an engine or a brake, which several wheels share."""
+    used = {one.column for one in chosen.values()}
+    strong, parts, against = (set(text.split()) for text in SUM_WORDS)
+    found = []
+    for column in table.names:
+        bare, unit = split_unit(column)
+        words = [word.lower() for word in _WORDS.findall(bare)]
+        unit = table.units.get(column, "") or unit
+        fits = not unit or _becomes(unit, f"wheel_torque_{WHEELS[0]}_nm")
+        if column in used or column in COLUMNS or not fits or _wheel_of(words) or against & set(words):
+            continue
+        if strong & set(words) and parts & set(words):
+            found.append(column)
+    return found
+
+
+def _sum_of(columns: list[str], table: Table) -> str:
+    """A sum of shares of these columns, to be filled in."""
+    terms = []
+    for column in columns:
+        stated = table.units.get(column, "") or split_unit(column)[1]
+        unit = "" if stated else ", unit: Nm"
+        terms.append(f"{{column: {json.dumps(column, ensure_ascii=False)}{unit}, scale: SHARE}}")
+    return f"{{sum: [{', '.join(terms)}]}}"
 
 
 def _source(name: str, candidate: Candidate) -> str:

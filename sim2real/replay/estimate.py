@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from scenarios.files import VehicleFile
-from scenarios.known import interval, is_known
+from scenarios.known import interval, is_known, is_lower_bound
 from scenarios.library import PAPER_VEHICLE, networks_folder, shipped
 from sim2real.logs import Log
 from sim2real.replay.camera import camera_side
 from sim2real.replay.inputs import make_inputs
 from sim2real.replay.run import Replay, Told, replay, silent
 from sim2real.replay.score import errors, excitation
-from trpac_core.estimator_data import Method
+from trpac_core.estimator_data import Method, Source
 from trpac_core.files import file_sha256
 from trpac_core.vision.camera import Camera
 
@@ -109,18 +109,21 @@ def estimate_log(
     return done, summary
 
 
-def _outcome(done: Replay) -> dict[str, float | None]:
+def _outcome(done: Replay) -> dict[str, float | str | None]:
     """The car's estimate at the end, and how sure it was where the tyre was seen."""
     theta, std, peak = done.ours.of_the_car
     moving = done.inputs.moving
     seen = done.seen.any(axis=1) & moving
-    low, high = done.of_the_car["TRPAC_low"], done.of_the_car["TRPAC_high"]
+    of_the_car = done.of_the_car["TRPAC_low"], done.of_the_car["TRPAC_high"]
+    judged = theta, *interval(done.method, theta, std, *of_the_car), done.source_of_the_car
     return {
         "TRPAC_end": float(theta[-1]),
         "TRPAC_std_end": float(std[-1]),
         "TRPAC_peak_end": float(peak[-1]),
         **{f"{name}_end": float(values[-1]) for name, values in done.of_the_car.items()},
+        "TRPAC_source_end": Source(int(done.source_of_the_car[-1])).label,
         "mean_std_seen": float(std[seen].mean()) if seen.any() else None,
-        "known_share": float(np.mean(is_known(*interval(done.method, theta, std, low, high))[moving])),
+        "known_share": float(np.mean(is_known(*judged)[moving])),
+        "lower_bound_share": float(np.mean(is_lower_bound(*judged)[moving])),
         "mean_std": float(std[moving].mean()),
     }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,10 +26,12 @@ from trpac_core.vehicle import WHEELS
 
 Array = NDArray[np.float64]
 
-TOP_THETA = 1.25
-"""Upper end of the axes of theta [-]."""
-TOP_USED = 1.5
-"""Upper end of the axes of used friction [-]."""
+TOP_THETA = 1.3
+"""Least upper end of the axes of theta: it holds the greatest bound of `robust` [-]."""
+ROOM = 1.05
+"""Upper end of an axis over its greatest value [-]."""
+SPIKES = 3.0
+"""Greatest value over the 99.5 % quantile above which an axis is cut off, and says so [-]."""
 UNUSABLE = "no row of the log has usable readings of a wheel."
 
 
@@ -36,20 +40,22 @@ def estimate(done: Replay) -> Figure:
     time_s = done.inputs.time_s
     theta, std, peak = done.ours.of_the_car
     of_the_car = done.of_the_car["TRPAC_low"], done.of_the_car["TRPAC_high"]
-    low, high = (bound * peak / theta for bound in interval(done.method, theta, std, *of_the_car))
+    low, high = interval(done.method, theta, std, *of_the_car)
     styles = estimator_styles([done.method.title, DYNAMICS])
     series = [
         Series("95 % interval", time_s, high, Style(BAND), low=low),
-        Series(f"TRPAC_peak ({done.method.title})", time_s, peak, styles[done.method.title]),
+        Series(f"TRPAC ({done.method.title})", time_s, theta, styles[done.method.title]),
     ]
+    if done.inputs.mu_reference is not None:
+        series.append(Series("TRPAC_peak", time_s, peak, Style(PURPLE, width=1.2)))
     if done.camera.left or done.camera.right:
-        alone = done.traces[DYNAMICS].of_the_car[2]
+        alone = done.traces[DYNAMICS].of_the_car[0]
         series.append(Series(f"without camera ({DYNAMICS})", time_s, alone, styles[DYNAMICS]))
     torque = done.inputs.wheel_torque_nm
     return Figure(
-        "Estimated peak friction with its interval, flags, speed and torque over time",
+        "TRPAC with its interval, flags, speed and torque over time",
         (
-            _theta("peak friction [-]", done, *series, height=1.6),
+            _theta("TRPAC [-]", done, *series, height=1.6),
             _flags(done),
             _over_time(
                 done, "speed [m/s]", UNUSABLE, Series("", time_s, done.inputs.speed_m_s, PLAIN), height=0.7
@@ -75,22 +81,15 @@ def _flags(done: Replay) -> Panel:
 def wheels(done: Replay) -> Figure:
     """Estimate, slip and used friction of each wheel."""
     time_s = done.inputs.time_s
-    peak, slip, used = (
-        _by_wheel(time_s, np.where(done.usable, values, np.nan))
-        for values in (done.ours.peak, done.slip, done.used_friction)
+    theta, slip, used = (
+        np.where(done.usable, values, np.nan) for values in (done.ours.theta, done.slip, done.used_friction)
     )
     return Figure(
-        "Peak friction, slip and used friction of each wheel over time",
+        "TRPAC, slip and used friction of each wheel over time",
         (
-            _theta("TRPAC_peak of each wheel [-]", done, *peak, height=1.2),
-            _over_time(done, "slip [-]", UNUSABLE, *slip, y_limits=(0.0, _largest(done.slip))),
-            _over_time(
-                done,
-                "used friction [-]",
-                UNUSABLE,
-                *used,
-                y_limits=(0.0, min(_largest(done.used_friction), TOP_USED)),
-            ),
+            _theta("TRPAC of each wheel [-]", done, *_by_wheel(time_s, theta), height=1.2),
+            _from_zero(done, "slip", slip),
+            _from_zero(done, "used friction", used),
         ),
     )
 
@@ -99,7 +98,7 @@ def curve(done: Replay) -> Figure:
     """Used friction over slip where the car drove: the tyre as the log shows it."""
     rows = done.usable & done.inputs.moving[:, None]
     slip, used = np.where(rows, done.slip, np.nan), np.where(rows, done.used_friction, np.nan)
-    most_slip, most_used = _largest(slip), min(_largest(used), TOP_USED)
+    most_slip, most_used = _end(slip), _end(used)
     points = [
         Series(wheel, slip[rows[:, i], i], used[rows[:, i], i], style, "points")
         for i, (wheel, style) in enumerate(WHEEL_STYLES.items())
@@ -112,10 +111,10 @@ def curve(done: Replay) -> Figure:
         line = np.array([0.0, end])
         points.append(Series("1.27 C_x / F_z", line, slope * line, TRUTH))
     panel = Panel(
-        "used friction [-]",
+        _label("used friction", used),
         "no row of the log has usable readings while the car drives.",
         tuple(points),
-        x_label="slip [-]",
+        x_label=_label("slip", slip),
         x_limits=(0.0, most_slip),
         y_limits=(0.0, most_used),
         height=1.6,
@@ -142,7 +141,21 @@ def _theta(label: str, done: Replay, *series: Series, height: float) -> Panel:
     reference = done.inputs.mu_reference
     if reference is not None:
         series += (Series("mu_reference", done.inputs.time_s, reference, TRUTH, "step"),)
-    return _over_time(done, label, UNUSABLE, *series, y_limits=(0.0, TOP_THETA), height=height)
+    lines = [s.y for s in series if s.low is None]
+    top = max(TOP_THETA, *(ROOM * _greatest(y) for y in lines))
+    series = tuple(
+        replace(s, name=f"{s.name} (cut off at {top:.2f})")
+        if s.low is not None and _greatest(s.y) > top
+        else s
+        for s in series
+    )
+    return _over_time(done, label, UNUSABLE, *series, y_limits=(0.0, top), height=height)
+
+
+def _from_zero(done: Replay, name: str, values: Array) -> Panel:
+    """A panel of a quantity of each wheel, of which no value is below 0."""
+    series = _by_wheel(done.inputs.time_s, values)
+    return _over_time(done, _label(name, values), UNUSABLE, *series, y_limits=(0.0, _end(values)))
 
 
 def _over_time(
@@ -158,7 +171,26 @@ def _over_time(
     return Panel(label, empty, series, x_limits=ends, y_limits=y_limits, ticks=ticks, height=height)
 
 
-def _largest(values: Array) -> float:
-    """Upper end of an axis: all but the largest half per cent, with some room."""
+def _greatest(values: Array) -> float:
+    """The greatest value that is known; 0 where none is."""
     known = values[np.isfinite(values)]
-    return max(1.1 * float(np.quantile(known, 0.995)), 1e-3) if len(known) else 1.0
+    return float(known.max()) if len(known) else 0.0
+
+
+def _cut(values: Array) -> float | None:
+    """Where an axis is cut off, since a few values are far above all others; None where it holds all."""
+    known = values[np.isfinite(values)]
+    usual = float(np.quantile(known, 0.995)) if len(known) else 0.0
+    return ROOM * usual if usual > 0.0 and _greatest(values) > SPIKES * usual else None
+
+
+def _end(values: Array) -> float:
+    """Upper end of an axis that begins at 0."""
+    cut = _cut(values)
+    return max(ROOM * _greatest(values), 1e-3) if cut is None else cut
+
+
+def _label(name: str, values: Array) -> str:
+    """Label of an axis, with where it is cut off."""
+    cut = _cut(values)
+    return f"{name} [-]" if cut is None else f"{name}, cut off at {cut:.2g} [-]"

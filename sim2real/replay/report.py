@@ -39,7 +39,7 @@ def estimates_table(done: Replay) -> pd.DataFrame:
         "TRPAC_peak": peak,
         **{f"TRPAC_std_{w}": ours.std[:, i] for i, w in enumerate(WHEELS)},
         **done.of_the_car,
-        "TRPAC_source": _labels(np.bitwise_or.reduce(done.source, axis=1)),
+        "TRPAC_source": _labels(done.source_of_the_car),
         **{f"TRPAC_low_{w}": done.low[:, i] for i, w in enumerate(WHEELS)},
         **{f"TRPAC_high_{w}": done.high[:, i] for i, w in enumerate(WHEELS)},
         **{f"TRPAC_source_{w}": _labels(done.source[:, i]) for i, w in enumerate(WHEELS)},
@@ -95,8 +95,9 @@ def sentences(summary: dict[str, Any]) -> list[str]:
     """Whether the estimate can be trusted; the estimate at the end; what the tyres showed; its errors."""
     said, driven, method = summary["excitation"], summary["estimate"], Method.of(summary["method"])
     theta, std, low, high = (driven[f"{n}_end"] for n in ("TRPAC", "TRPAC_std", "TRPAC_low", "TRPAC_high"))
-    first, *wide = known.sentences(theta, std, *known.interval(method, theta, std, low, high))
-    found = [f"At the end: {first}", *wide]
+    source = Source[driven["TRPAC_source_end"].upper()]
+    first, *why = known.sentences(theta, std, *known.interval(method, theta, std, low, high), source)
+    found = [f"At the end: {first}", *why]
     if not summary.get("torque_fits_car", True):
         found[0] = f"The estimate cannot be trusted: the logged torque does not fit the car. {found[0]}"
     share = percent(said["seen_share"])
@@ -105,7 +106,9 @@ def sentences(summary: dict[str, Any]) -> list[str]:
         shown += (
             ", since no tyre slipped above its threshold: brake or accelerate harder, up to a slip of 0.02"
         )
-    found.append(f"{shown}. TRPAC was known for {percent(driven['known_share'])} of it.")
+    bound = driven["lower_bound_share"]
+    bounded = f"; only a lower bound was known for {percent(bound)}" if bound else ""
+    found.append(f"{shown}. TRPAC was known for {percent(driven['known_share'])} of it{bounded}.")
     error = (summary["errors"] or {}).get(method.title, {}).get("seen", {})
     if error.get("mean_abs") is not None:
         found.append(

@@ -15,6 +15,7 @@ from sim2real.replay.inputs import Inputs
 from sim2real.replay.vehicle_level import vehicle_level
 from trpac_core.estimator import Estimate, EstimatorConfig, TrpacEstimator
 from trpac_core.estimator_data import Method
+from trpac_core.robust.messages import WRONG_INPUT
 from trpac_core.sensors import Sensors
 from trpac_core.tyre import peak_friction
 from trpac_core.vehicle import WHEELS
@@ -126,6 +127,11 @@ class Replay:
             "TRPAC_expected_std": expected_std,
         }
 
+    @cached_property
+    def source_of_the_car(self) -> NDArray[np.int_]:
+        """`Source` of all wheels together, shape (n,)."""
+        return np.bitwise_or.reduce(self.source, axis=1)
+
 
 def replay(
     inputs: Inputs,
@@ -184,7 +190,7 @@ def replay(
         expected_std=of("TRPAC_expected_std"),
         source=of("source").astype(int),
         method=method,
-        messages=tuple(messages.values()),
+        messages=_trusted(messages),
     )
 
 
@@ -210,6 +216,16 @@ def _our_wheel(
         messages |= estimator.messages()
         _tell(told, f"estimator {name}", row + 1, len(inputs))
     return said, messages
+
+
+def _trusted(messages: dict[str, str]) -> tuple[str, ...]:
+    """The messages without those that name values of an axle whose readings are said to be wrong."""
+    wrong = {about.split()[0] for about, text in messages.items() if text.endswith(WRONG_INPUT)}
+    return tuple(
+        text
+        for about, text in messages.items()
+        if text.endswith(WRONG_INPUT) or about.split()[0] not in wrong
+    )
 
 
 def _peer_traces(inputs: Inputs, load_n: Array, told: Told) -> dict[str, Trace]:

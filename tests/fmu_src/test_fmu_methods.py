@@ -17,6 +17,7 @@ from fmu_src.signals import INPUTS, INTERVAL_OUTPUTS, OUTPUTS
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.estimator_data import Method
 from trpac_core.four_wheels import CarSensors, FourWheels, FourWheelsConfig, SideClasses
+from trpac_core.robust.messages import WRONG_INPUT
 from trpac_core.sensors import Sensors
 from trpac_core.vehicle import WHEELS
 from trpac_core.vision.classes import Surface
@@ -135,6 +136,16 @@ def test_a_wheel_of_another_radius_is_logged_once(open_unit: Open) -> None:
     about = [line for line in unit.log if "wheel_radius_m" in line.text]
     assert [line.status for line in about] == [WARNING]
     assert "Front wheels do not have the expected radius" in about[0].text
+
+
+@pytest.mark.e2e
+def test_a_slip_that_no_radius_explains_is_said_as_in_python(open_unit: Open) -> None:
+    unit = open_unit(estimator__method=Method.ROBUST.value)
+    for values in drive(600, radius_m=1.08 * RADIUS_M):
+        unit.step(values, step_s=STEP_S)
+    said = [line.text for line in unit.log if line.text.endswith(WRONG_INPUT)]
+    assert any("Front wheels slip without force, which no radius explains: " in text for text in said)
+    assert not any("wheel_radius_m" in line.text for line in unit.log)
 
 
 @pytest.mark.e2e

@@ -105,7 +105,9 @@ class TestEstimate:
         return replay.sentences(
             {
                 "method": method,
-                "estimate": values | {"known_share": 0.05} | end,
+                "estimate": values
+                | {"known_share": 0.05, "lower_bound_share": 0.0, "TRPAC_source_end": "tyre"}
+                | end,
                 "excitation": shown | (excitation or {}),
                 "errors": errors,
             }
@@ -120,6 +122,25 @@ class TestEstimate:
     def test_a_narrow_interval_is_known(self):
         first, *_ = self.said(TRPAC_std_end=0.05, TRPAC_low_end=0.26, TRPAC_high_end=0.45)
         assert first == "At the end: 0.34, with standard deviation 0.05 and 95 % interval 0.26 to 0.45."
+
+    def test_at_the_end_of_the_range_only_the_lower_bound_is_known(self):
+        first, why, driven = self.said(
+            TRPAC_end=1.2, TRPAC_low_end=1.01, TRPAC_high_end=1.27, lower_bound_share=0.9
+        )
+        assert first == "At the end: at least 1.01, from the friction in use."
+        assert why == "No upper bound is known: the estimate reaches the end of its range, a TRPAC of 1.2."
+        assert driven.endswith("TRPAC was known for 5 % of it; only a lower bound was known for 90 %.")
+
+    def test_an_interval_without_an_upper_end_is_a_lower_bound(self):
+        end = {"TRPAC_end": 1.0, "TRPAC_low_end": 0.75, "TRPAC_high_end": 1.272}
+        for source, what in known.BY_SOURCE.items():
+            first, *_ = self.said(**end, TRPAC_source_end=source.label)
+            assert first == f"At the end: at least 0.75, from {what}."
+
+    def test_without_a_source_an_interval_past_the_range_is_a_lower_bound(self):
+        end = {"TRPAC_end": 1.0, "TRPAC_low_end": 0.75, "TRPAC_high_end": 1.21}
+        assert "at least 0.75" in self.said(**end, TRPAC_source_end="none")[0]
+        assert self.said(**end)[0].endswith("95 % interval 0.75 to 1.21.")
 
     def test_other_methods_have_two_deviations_to_either_side(self):
         first, *_ = self.said(method="dife", TRPAC_std_end=0.05)
@@ -137,8 +158,8 @@ class TestEstimate:
 
 def test_known_is_what_tells_dry_road_from_snow():
     assert known.WIDEST == pytest.approx(0.6)
-    assert known.is_known(0.2, 0.79)
-    assert not known.is_known(0.2, 0.81)
+    assert known.is_known(0.5, 0.2, 0.79, Source.NONE)
+    assert not known.is_known(0.5, 0.2, 0.81, Source.TYRE)
     low, high = known.interval(Method.DIFE, np.array([0.5]), np.array([0.1]), None, None)
     assert (low[0], high[0]) == pytest.approx((0.3, 0.7))
 

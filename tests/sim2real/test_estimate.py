@@ -2,6 +2,7 @@
 
 import json
 import re
+from base64 import b64decode
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,10 +24,11 @@ from scenarios.library import networks_folder
 from scenarios.plant.pipeline import drive
 from scenarios.plant.sensors import make_scenario_log
 from sim2real.logs import load_mapping, read_log, write_log
+from sim2real.replay import figures
 from sim2real.replay.camera import camera_side
 from sim2real.replay.estimate import TABLE_3, estimate_log
 from sim2real.replay.inputs import make_inputs, white_noise
-from sim2real.replay.run import OURS, readings, replay
+from sim2real.replay.run import OURS, _trusted, readings, replay
 from sim2real.replay.score import score
 from sim2real.replay.vehicle_level import vehicle_level
 from trpac_cli.main import app
@@ -34,6 +36,7 @@ from trpac_core.car_friction import Friction, car_friction
 from trpac_core.estimator import EstimatorConfig, TrpacEstimator
 from trpac_core.estimator_data import Method
 from trpac_core.four_wheels import FourWheelsConfig
+from trpac_core.robust.messages import WRONG_INPUT
 from trpac_core.vision.classes import Surface
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -139,6 +142,18 @@ class TestCommand:
         assert "drive.csv" in page.text
         names = {trace["name"] for spec in page.specs for trace in spec["data"]}
         assert {"fl", "fr", "rl", "rr", "mu_reference", "EKF", "UKF", "slip-slope", "95 % interval"} <= names
+
+    def test_the_axes_of_the_report_hold_all_lines(self, estimated):
+        page = require_report((estimated[0] / "report.html").read_text())
+        names = set()
+        for spec in page.specs:
+            if (ends := spec["layout"]["yaxis"].get("range")) is None:
+                continue
+            for trace in spec["data"]:
+                y = np.frombuffer(b64decode(trace["y"]["bdata"]), dtype="<f4")
+                assert np.nanmax(y) <= ends[1], trace["name"]
+                names.add(trace["name"])
+        assert {"TRPAC (robust)", "TRPAC_peak", "95 % interval", "fl"} <= names
 
     def test_it_says_what_it_found(self, estimated):
         said = " ".join(estimated[1].stdout.split())
@@ -353,6 +368,28 @@ class TestInputs:
         rounded = np.round((15.0 + 0.5 * np.sin(t)) / 0.1) * 0.1
         assert white_noise(rounded) == pytest.approx(0.1 / np.sqrt(12.0), rel=0.01)
         assert white_noise(np.ones(100)) == 0.0
+
+
+def test_an_axle_with_wrong_readings_is_given_no_advice():
+    said = {
+        "Front wheels": "Front wheels do not have the expected radius. Adjust it.",
+        "Front tyres": f"Front tyres: {WRONG_INPUT}",
+        "Rear wheels": "Rear wheels do not have the expected radius. Adjust it.",
+    }
+    assert _trusted(said) == (said["Front tyres"], said["Rear wheels"])
+
+
+class TestAxes:
+    def test_an_axis_holds_its_greatest_value(self):
+        values = np.array([0.0, np.nan, 3.7, 1.0])
+        assert figures._end(values) == pytest.approx(1.05 * 3.7)
+        assert figures._label("used friction", values) == "used friction [-]"
+        assert figures._end(np.array([np.nan])) > 0.0
+
+    def test_a_few_spikes_are_cut_off_and_the_label_says_so(self):
+        values = np.append(np.ones(1000), 50.0)
+        assert figures._end(values) == pytest.approx(1.05)
+        assert figures._label("slip", values) == "slip, cut off at 1.1 [-]"
 
 
 class TestVehicleLevel:

@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 
 from sim2real.logs import REQUIRED, load_mapping, read_log, resample
+from sim2real.logs.errors import LogError
 
 MAPPINGS = Path(__file__).parents[2] / "sim2real" / "mappings"
 FOLDERS = {"plants": 10, "carsim_vhf": 4, "bmw_m8_roadview": 1}
+
+
+def test_a_shipped_mapping_is_found_by_its_name():
+    assert load_mapping("plants").path == MAPPINGS / "plants.yaml"
+    with pytest.raises(LogError, match="did you mean 'plants'"):
+        load_mapping("plant")
 
 
 @pytest.mark.parametrize("path", sorted(MAPPINGS.glob("*.yaml")), ids=lambda p: p.stem)

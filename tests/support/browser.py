@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import pytest
 
@@ -37,6 +38,22 @@ def require_chromium() -> None:
         pytest.skip(f"no {CHROMIUM}: pages are not looked at in a browser")
     for name in ("playwright", "axe_playwright_python"):
         pytest.importorskip(name, reason=f"{name} is not installed: pages are not looked at in a browser")
+
+
+@contextmanager
+def plots_page(path: Path) -> Iterator[Any]:
+    """The first plot of a page, as a locator of an open browser."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
+        try:
+            page = browser.new_page(viewport={"width": WIDTHS[1], "height": HEIGHT})
+            page.goto(path.resolve().as_uri())
+            page.locator(".canvas .modebar").first.wait_for(state="attached")
+            yield page.locator(".canvas").first
+        finally:
+            browser.close()
 
 
 def problems(pages: Iterable[tuple[str, Path]], pictures: Path | None = None) -> list[str]:

@@ -7,7 +7,7 @@ import made_up_diagnosis as made_up
 import numpy as np
 import pytest
 import yaml
-from browser import problems, require_chromium
+from browser import plots_page, problems, require_chromium
 from log_maker import make_frame
 from report_page import require_report
 
@@ -84,6 +84,22 @@ def test_every_report_says_its_failures_first(reports):
 def test_every_report_can_be_read_on_a_phone_and_in_the_dark(reports):
     require_chromium()
     assert problems(reports.items()) == []
+
+
+@pytest.mark.long
+def test_the_bar_of_a_plot_covers_no_data(reports):
+    require_chromium()
+    with plots_page(reports["estimate"]) as canvas:
+        place, bar = canvas.bounding_box(), canvas.locator(".modebar")
+        opacity = "bar => getComputedStyle(bar).opacity"
+        assert bar.evaluate(opacity) == "0"
+        canvas.hover()
+        canvas.page.wait_for_function(
+            "bar => getComputedStyle(bar).opacity === '1'", arg=bar.element_handle()
+        )
+        over = bar.bounding_box()
+        assert over["y"] + over["height"] <= place["y"]
+        bar.locator(".modebar-btn").last.click()
 
 
 @pytest.mark.long

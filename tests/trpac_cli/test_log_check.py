@@ -111,6 +111,25 @@ def test_a_column_is_proposed_for_its_own_wheel_and_quantity_alone(tmp_path):
     assert "  # wheel_torque_fr_nm: {column: NAME, unit: UNIT}   # no column found" in text
 
 
+def test_torques_of_engine_and_brake_are_proposed_as_sums(tmp_path):
+    names = ("t", "engine_torque_at_wheels", "brake_torque_demand", "engine_torque_limit", "net_torque")
+    text = proposed_mapping(Table(names, {}, {}, np.arange(0)), "a.csv")
+    for wheel in ("fl", "fr", "rl", "rr"):
+        assert (
+            f'  # wheel_torque_{wheel}_nm: {{sum: [{{column: "engine_torque_at_wheels", unit: Nm, scale: SHARE}}, '
+            '{column: "brake_torque_demand", unit: Nm, scale: SHARE}]}'
+        ) in text
+    filled = tmp_path / "map.yaml"
+    filled.write_text(
+        "\n".join(
+            line.replace("# wheel_torque", "wheel_torque").replace("SHARE}", "0.25}")
+            for line in text.splitlines()
+        )
+    )
+    assert "wheel_torque_fl_nm" in load_mapping(filled).columns
+    assert "only needed for a road of several stretches" in text
+
+
 def test_without_propose_the_mapping_is_shown_and_nothing_written(german, tmp_path):
     before = sorted(tmp_path.iterdir())
     done = run("log", "check", german)

@@ -13,7 +13,7 @@ from trpac_core.errors import TrpacError
 from trpac_core.estimator import EstimatorConfig, RoadClass, TrpacEstimator
 from trpac_core.estimator_data import Method, Source
 from trpac_core.four_wheels import CarSensors, FourWheels, FourWheelsConfig
-from trpac_core.robust.messages import LASTING_S
+from trpac_core.robust.messages import LASTING_S, WRONG_INPUT
 from trpac_core.sensors import Sensors
 from trpac_core.vehicle import Vehicle
 from trpac_core.vision.classes import Surface
@@ -204,6 +204,16 @@ def test_a_tyre_of_another_curve_is_named_with_its_stiffness():
     assert "expected 64 kN (1.27 C_x)" in text
     assert f"at {LOAD_N / 1000.0:.1f} kN load" in text
     assert "adjust tyre.longitudinal_stiffness_n in vehicle.yaml" in text
+
+
+@pytest.mark.parametrize("share", [1.08, 1.12])
+def test_a_radius_that_no_wheel_has_is_called_a_wrong_reading(share):
+    messages = messages_of(radius_m=share * CAR.wheel_radius_m)
+    assert (
+        messages["Front wheels"]
+        == f"Front wheels slip without force, which no radius explains: {WRONG_INPUT}"
+    )
+    assert not any("djust" in text for text in messages.values())
 
 
 @pytest.mark.parametrize(("share", "front"), [(1.015, True), (0.985, False)])

@@ -161,6 +161,15 @@ void add_unusable(Text *text, Unusable reason, const Sensors *sensors)
     }
 }
 
+static bool add_implausible(Text *text, const OneWheel *wheel, const char *what)
+{
+    if (!messages_is_implausible(&wheel->state.robust, &wheel->known.robust, wheel->known.static_load_n))
+        return false;
+    add(text, what);
+    add(text, ": the measured wheel torque or a speed is wrong, or vehicle.yaml.");
+    return true;
+}
+
 bool add_tyres(Text *text, const OneWheel *wheel)
 {
     const RobustState *state = &wheel->state.robust;
@@ -170,6 +179,8 @@ bool add_tyres(Text *text, const OneWheel *wheel)
     if (!learnt_n.has)
         return false;
     add(text, wheel->config.front_axle ? "Front" : "Rear");
+    if (add_implausible(text, wheel, " tyres are further from the expected curve than any tyre"))
+        return true;
     add(text, " tyres do not follow the expected curve: slip stiffness estimated ");
     add_fixed(text, 1e-3 * learnt_n.value, 0, false);
     add(text, " kN per unit slip at ");
@@ -191,6 +202,8 @@ bool add_wheels(Text *text, const OneWheel *wheel)
     if (!offset.has)
         return false;
     add(text, wheel->config.front_axle ? "Front" : "Rear");
+    if (add_implausible(text, wheel, " wheels slip without force, which no radius explains"))
+        return true;
     add(text, " wheels do not have the expected radius: slip without force estimated ");
     add_fixed(text, 100.0 * offset.value, 1, true);
     add(text, " %, as of a radius of ");
