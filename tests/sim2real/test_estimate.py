@@ -149,10 +149,10 @@ class TestCommand:
         for spec in page.specs:
             if (ends := spec["layout"]["yaxis"].get("range")) is None:
                 continue
-            for trace in spec["data"]:
-                y = np.frombuffer(b64decode(trace["y"]["bdata"]), dtype="<f4")
-                assert np.nanmax(y) <= ends[1], trace["name"]
-                names.add(trace["name"])
+            for series in spec["data"]:
+                y = np.frombuffer(b64decode(series["y"]["bdata"]), dtype="<f4")
+                assert np.nanmax(y) <= ends[1], series["name"]
+                names.add(series["name"])
         assert {"TRPAC (robust)", "TRPAC_peak", "95 % interval", "fl"} <= names
 
     def test_it_says_what_it_found(self, estimated):
