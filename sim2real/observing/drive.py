@@ -66,7 +66,7 @@ class Drive:
         What was taken off `measured` since it repeats with the wheels' angle, see `sim2real.observing.orders`.
     reference : array, shape (n, 7), or None
         What the nominal model leaves of a reference log at the same points of the manoeuvre, in each channel's unit; it
-        is subtracted from what any model leaves of this log. NaN where the reference says nothing; see
+        is subtracted from what any model leaves of this log. NaN where there is no reference; see
         `sim2real.observing.reference`.
     """
 

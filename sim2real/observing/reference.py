@@ -34,7 +34,7 @@ LEAST_COVERED = 0.5
 SMOOTHED_S = 0.2
 """Positions are averaged over this time before rows are matched by them: they have noise of centimetres [s]."""
 FORGOTTEN_S = 0.3
-"""Before and after rows at which the two cars are on different roads, the reference says nothing for so long: three
+"""Before and after rows at which the two cars are on different roads, the reference is not used for so long: three
 times the observer's memory of the wheels [s]."""
 OTHER_TORQUE = 0.25
 """Root mean square of the torques' difference over that of the torque from which on a pair was driven otherwise [-]."""

@@ -17,7 +17,7 @@ from trpac_core.vision.classes import CLASS_THETA, Surface
 Array = NDArray[np.float64]
 
 NEEDED = ("image_class", "image_from_m", "image_to_m")
-"""Without these a log says nothing of where the camera saw what."""
+"""Without these it is not known which stretch of road a result is for."""
 LONGEST_STAMP_M = 50.0
 FARTHEST_STAMP_M = 200.0
 """A stretch longer than the one, or farther from the car than the other, is no displacement stamp [m]."""
