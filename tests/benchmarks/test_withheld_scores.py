@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 import yaml
+from long import long
 
 from benchmarks.gap.withheld import runner
 from benchmarks.gap.withheld.command import watch
@@ -298,6 +299,7 @@ def test_a_case_that_cannot_be_made_stays_pending_and_stops_no_run(tmp_path, mon
     assert not list(tmp_path.iterdir())
 
 
+@long
 def test_scores_tell_what_is_pending(tmp_path, fake_diagnose):
     runner.seal_run(tmp_path, "small", 1)
     runner.run_case(next(s for s in table("small") if s.group is Group.NO_GAP), 1, tmp_path, keep=False)

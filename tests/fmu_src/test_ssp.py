@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from fmu_unit import STEP_S, Unit
 from foreign_clients import need_client
-from long import beyond
+from long import beyond, long
 
 import build_ssp
 from fmu_src.build_command import EXIT_BUILD, EXIT_USAGE
@@ -177,7 +177,7 @@ def onto_ice(wiring: Wiring) -> Wiring:
 
 
 @pytest.mark.e2e
-@pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.parametrize("name", beyond(1, SYSTEMS))
 def test_the_package_runs_as_the_units_wired_by_hand(
     name: str, units: dict[str, Path], tmp_path: Path
 ) -> None:
@@ -364,6 +364,7 @@ def test_command_line_builds_validates_runs_and_prints_the_hash(
 
 @pytest.mark.e2e
 @pytest.mark.skipif(find_spec("ziglang") is not None, reason="builds for all platforms, which takes minutes")
+@long
 def test_command_line_builds_with_the_native_estimator(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, native_file: Path
 ) -> None:

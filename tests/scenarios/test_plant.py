@@ -358,10 +358,13 @@ def test_other_forms_agree_with_the_independent_solver(load_transfer_m, by_slope
 
 @pytest.mark.parametrize(
     ("effect", "shares"),
-    [
-        (DrivelineComplianceOfAxles(4000.0, 5.0, 0.5, 0.4), [1.4, 1.4, 0.6, 0.6]),
-        (DrivelineComplianceOfWheels(4000.0, 5.0, 0.5, 0.2, -0.3, 0.1), [0.9, 1.5, 0.9, 0.7]),
-    ],
+    beyond(
+        1,
+        [
+            (DrivelineComplianceOfWheels(4000.0, 5.0, 0.5, 0.2, -0.3, 0.1), [0.9, 1.5, 0.9, 0.7]),
+            (DrivelineComplianceOfAxles(4000.0, 5.0, 0.5, 0.4), [1.4, 1.4, 0.6, 0.6]),
+        ],
+    ),
 )
 def test_shafts_that_are_unlike_agree_with_the_independent_solver(effect, shares):
     knots = ((0.0, 0.0), (0.05, 250.0), (0.6, 250.0), (0.65, -150.0), (1.2, -150.0), (1.25, 0.0), (1.6, 0.0))

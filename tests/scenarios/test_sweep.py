@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 import yaml
 from distributed import Client, LocalCluster
+from long import long
 from report_page import require_report
 from typer.testing import CliRunner
 
@@ -396,6 +397,7 @@ def test_a_cluster_by_address_loses_no_run_when_a_worker_dies(sweep_of, tmp_path
 
 
 @pytest.mark.e2e
+@long
 def test_the_command_writes_table_and_report(tmp_path):
     path, out = tmp_path / "sweep.yaml", tmp_path / "out"
     axis = {"parameter": "camera.wrong_share", "levels": [0.0, 1.0]}

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from gap_drives import MODEL, clean, noisy, pulses, road_of, trace
+from long import long
 
 from benchmarks.gap.builds.draw import COURSES, SIZES, write_case
 from benchmarks.gap.builds.learn import Told, covariance_of, width_of
@@ -319,6 +320,7 @@ def test_two_faults_on_foreign_tyres_share_the_probability():
     assert decision.probability["brake_drag"] < 0.05
 
 
+@long
 def test_what_the_car_had_before_is_not_the_fault():
     """A baseline with the same effect says that it is how the car is, not what happened to it."""
     heavy = {**FOREIGN_TYRE, "mass_offset": {"mass_kg": 200.0}}

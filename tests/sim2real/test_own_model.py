@@ -273,6 +273,7 @@ def test_what_cannot_be_told_of_the_parameters_is_said_before_anything_is_fitted
 
 
 @pytest.mark.e2e
+@long
 def test_our_plant_as_their_model(tmp_path):
     """The unit ReferencePlant, whose car has softer tyres than vehicle.yaml, beside logs with a weaker torque."""
     archive = build_unit(UNITS["ReferencePlant"], tmp_path / "ReferencePlant.fmu")

@@ -50,6 +50,8 @@ def loosened(schema: Any) -> Any:
     }
     if isinstance(kept.get("type"), str) and kept["type"] != "null":
         kept["type"] = ["null", "number" if kept["type"] == "integer" else kept["type"]]
+    if kept.get("type") == "null":  # no run had a value: anything may come
+        del kept["type"]
     return kept
 
 

@@ -516,7 +516,15 @@ def command() -> Iterator[Callable[[Arguments, Path], dict[str, Any]]]:
     host.wait(timeout=60)
 
 
-SLOW = ("examined unit unfolds", "part is nested", "part of another number", "Parquet of 5 GB")
+SLOW = (
+    "examined unit unfolds",
+    "unit of a million entries",
+    "part is nested",
+    "part of another number",
+    "part is empty",
+    "DBC nested",
+    "Parquet of 5 GB",
+)
 """Kinds that take many seconds and have a neighbour of the same reader in the list."""
 
 

@@ -38,7 +38,7 @@ def diagnoses(text: str) -> None:
     assert float(found[1]) == pytest.approx(0.08, abs=0.005)
     assert "second diagnosis: no_gap" in text
     assert re.search(r"mass_offset .*torque_gain.*do not separate them", text)
-    assert re.search(r"is mass_offset \(mass_kg 1[45]\d", text)
+    assert re.search(r"mass_offset \(mass_kg 1[45]\d", text)
 
 
 def runs_the_unit(text: str) -> None:

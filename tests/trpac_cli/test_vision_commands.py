@@ -13,6 +13,7 @@ import schemas
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from long import long
 from scipy.special import log_softmax, softmax
 from typer.testing import CliRunner
 
@@ -493,6 +494,7 @@ def test_unusable_input_is_one_message_and_leaves_no_trace(folder, camera_file, 
     assert sorted(tmp_path.rglob("*")) == before
 
 
+@long
 def test_a_run_broken_off_leaves_the_results_of_the_last_one(folder, camera_file, tmp_path):
     out = tmp_path / "out"
     assert drive(folder, camera_file, out).exit_code == 0
@@ -508,6 +510,7 @@ def test_a_run_broken_off_leaves_the_results_of_the_last_one(folder, camera_file
     assert sorted(path.name for path in tmp_path.iterdir()) == ["camera.yaml", "frames", "out"]
 
 
+@long
 def test_without_an_encoder_there_is_the_strip_and_the_run_says_so(
     folder, camera_file, tmp_path, monkeypatch
 ):

@@ -11,6 +11,7 @@ from foresight_drive import CONFIG, at, drive, road
 from hypothesis import given
 from hypothesis import strategies as st
 from ife_scene import CAMERA, DRY, PAINT, SNOW, WET, Masks, Middle, paint
+from long import beyond
 from numpy.testing import assert_allclose, assert_array_equal
 
 from trpac_core.vision.evidence import WeightLaw, basic_probability, combine
@@ -87,7 +88,7 @@ def test_no_patch_lies_on_a_line_that_is_known():
     assert_array_equal(near.ahead_m > 3.5, above)
 
 
-@pytest.mark.parametrize("first_m", [0.05, 0.25, 0.45])
+@pytest.mark.parametrize("first_m", beyond(1, [0.25, 0.05, 0.45]))
 @pytest.mark.parametrize("law", [WeightLaw(), WeightLaw(sigmoid_centre=1 / 3, sigmoid_slope=10.0)])
 def test_the_verdict_changes_with_most_of_the_ground(first_m, law):
     """To twice the step of the rows in which lines are looked for, however much what the road was before weighs."""

@@ -22,6 +22,7 @@ from hil_fakes import MS, FakeClock, unsaid
 from hil_foreign import DBC, SIGNALS, foreign_car
 from hypothesis import given
 from hypothesis import strategies as st
+from long import long
 from typer.testing import CliRunner
 
 import trpac
@@ -807,6 +808,7 @@ def test_a_long_wait_says_once_what_it_waits_for(tmp_path: Path) -> None:
     assert told == ["waiting up to 5 s for vehicle_speed_m_s; Ctrl-C ends."]
 
 
+@long
 def test_ctrl_c_while_it_waits_ends_it_with_a_summary_of_no_cycles(unit_file: Path, tmp_path: Path) -> None:
     stopper = Stopper()
     threading.Timer(1.0, stopper.ask).start()

@@ -162,6 +162,7 @@ def test_what_is_on_the_bus_is_what_fmpy_gives_for_the_same_inputs(
     assert estimates[-1]["Status"] == 7.0
 
 
+@long
 def test_a_method_is_that_of_the_unit(unit_file: Path, tmp_path: Path) -> None:
     """At the start the robust estimate is the mean of all roads, that of the others `estimator.theta_initial`."""
     command = ["hil", "--with-plant", "--fmu", str(unit_file), "--rate-hz", "100", "--duration-s", "0.2"]

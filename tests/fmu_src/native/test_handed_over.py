@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from long import beyond
 from native_calls import bits, build
 from native_drives import IMPOSSIBLE_STEPS_S, ODD_STEPS_S, SIDES, WHEELS, drive
 
@@ -106,7 +107,8 @@ def inputs_of_four(held, values):
 
 @pytest.mark.parametrize("method", list(Method), ids=lambda method: method.label)
 @pytest.mark.parametrize(
-    ("made", "inputs", "ends"), [(one_wheel, inputs_of_one, ()), (four, inputs_of_four, (WHEELS, SIDES))]
+    ("made", "inputs", "ends"),
+    beyond(1, [(one_wheel, inputs_of_one, ()), (four, inputs_of_four, (WHEELS, SIDES))]),
 )
 def test_python_and_c_by_turns_give_what_python_alone_does(in_c, made, inputs, ends, method):
     alone, by_turns, held = made(method), made(method), {}

@@ -16,6 +16,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import fmi3InstanceEnvironment
 from fmpy.validation import validate_fmu
 from fmu_unit import DRIVING, Unit, Unit3
+from long import long
 from native_drives import drive, drive_of_four, rows
 from native_units import ATTRIBUTES, bits, called, compiled_host, driven
 
@@ -73,6 +74,7 @@ def test_it_gives_and_tells_what_the_unit_for_fmi_2_does(both, method):
     assert len({values["slip"] for values in trace}) > STEPS / 4
 
 
+@long
 def test_so_does_the_unit_of_four_wheels(native_folder_4w, tmp_path):
     file = build_native(UNITS["TrpacEstimator4W"].info, tmp_path / "unit.fmu", fmi=3, everywhere=False)
     assert list(validate_fmu(str(file))) == []
