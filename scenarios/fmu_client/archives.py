@@ -135,7 +135,7 @@ def _reason(error: Exception) -> str:
 
 @contextmanager
 def opened_archive(
-    path: str | Path, expected: str = "a unit, a zip archive such as build_fmu.py makes"
+    path: str | Path, expected: str = "a unit, a zip archive such as `trpac fmu build` makes"
 ) -> Iterator[Archive]:
     """An open archive, after checks of all limits and for XML texts without document types.
 
