@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
 import re
@@ -42,7 +43,6 @@ DEEPEST = 2
 """How many levels of keys a table goes down."""
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 MATH = re.compile(r'<(span|div) class="arithmatex">(?:\\\(|\\\[)(.*?)(?:\\\)|\\\])</\1>', re.DOTALL)
-UNESCAPED = {"&amp;": "&", "&lt;": "<", "&gt;": ">"}
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -83,20 +83,18 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     return LINK.sub(led, markdown)
 
 
-def on_page_content(html: str, **_: Any) -> str:
+def on_page_content(content: str, **_: Any) -> str:
     """Turn mathematics into MathML, which a browser shows without a script."""
 
     def shown(found: re.Match[str]) -> str:
-        tag, latex = found.groups()
-        for escaped, plain in UNESCAPED.items():
-            latex = latex.replace(escaped, plain)
+        tag, latex = found[1], html.unescape(found[2])
         if tag == "span":
             return convert(latex.strip())
         return convert(latex.strip(), display="block").replace(
             "<math ", '<math tabindex="0" ', 1
         )  # it scrolls
 
-    return MATH.sub(shown, html)
+    return MATH.sub(shown, content)
 
 
 def on_post_page(output: str, **_: Any) -> str:

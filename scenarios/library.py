@@ -28,8 +28,7 @@ def networks_folder() -> Path:
 
 def shipped(kind: str) -> dict[str, Path]:
     """Paths of the shipped files of a kind by name, in alphabetical order."""
-    folder = Path(str(files(__package__))) / FOLDERS[kind]
-    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+    return _named(_folder(kind))
 
 
 def located(kind: str, given: str | Path) -> Path:
@@ -40,12 +39,25 @@ def located(kind: str, given: str | Path) -> Path:
     ScenarioError
         A name that is neither a file nor shipped.
     """
+    return located_in(_folder(kind), kind, given)
+
+
+def located_in(folder: Path, kind: str, given: str | Path) -> Path:
+    """The path of a file: a path as given, or the file in a folder of a name without ending; raises ScenarioError."""
     path = Path(given)
     if path.suffix or len(path.parts) != 1 or path.exists():
         return path
-    known = shipped(kind)
+    known = _named(folder)
     if path.name not in known:
         raise ScenarioError(
             f"{quoted(path)}: neither a file nor the name of a shipped {kind}; {suggestion(path.name, known)}"
         )
     return known[path.name]
+
+
+def _folder(kind: str) -> Path:
+    return Path(str(files(__package__))) / FOLDERS[kind]
+
+
+def _named(folder: Path) -> dict[str, Path]:
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}

@@ -14,6 +14,7 @@ from scenarios.files import VehicleFile, load_road, load_vehicle
 from scenarios.strict import load_strict
 from sim2real.how_far.gap import measure
 from sim2real.logs import load_mapping, read_log
+from sim2real.logs.mapping import MAPPINGS
 from sim2real.observing.drive import Drive, awake
 from sim2real.observing.evidence import Evidence, gather
 from sim2real.observing.observer import Simulation
@@ -21,7 +22,6 @@ from sim2real.result import Measure
 from sim2real.sources import drive_of, on_grid
 
 FOLDER = Path(__file__).parent
-MAPPINGS = FOLDER.parent / "mappings"
 
 
 class _Part(BaseModel):

@@ -10,13 +10,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
-from scenarios.errors import suggestion
+from scenarios.library import located_in
 from scenarios.strict import load_strict
 from sim2real.logs.contract import COLUMNS, IMAGE_PATH, TIME
 from sim2real.logs.errors import LogError
 from sim2real.logs.times import FORMS, SECONDS
 from sim2real.logs.units import factor
-from trpac_core.files import quoted
 
 MAPPINGS = Path(__file__).parents[1] / "mappings"
 """Folder of the shipped mapping files."""
@@ -242,25 +241,14 @@ MappingFile = create_model(
 
 def load_mapping(given: str | Path) -> Mapping:
     """Read a mapping file, or the shipped one of this name; all of its problems in one LogError."""
-    path = _located(Path(given))
     try:
+        path = located_in(MAPPINGS, "mapping", given)
         file = load_strict(path, MappingFile)
     except LogError:
         raise
     except ValueError as error:
         raise LogError(str(error)) from error
     return mapping_of(file, path)
-
-
-def _located(given: Path) -> Path:
-    if given.suffix or len(given.parts) != 1 or given.exists():
-        return given
-    shipped = {path.stem: path for path in sorted(MAPPINGS.glob("*.yaml"))}
-    if given.name not in shipped:
-        raise LogError(
-            f"{quoted(given)}: neither a file nor the name of a shipped mapping; {suggestion(given.name, shipped)}"
-        )
-    return shipped[given.name]
 
 
 def mapping_of(file: BaseModel, path: Path) -> Mapping:
