@@ -244,7 +244,7 @@ def test_a_missing_unit_is_said(scenario_file, tmp_path):
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 2
     assert "none.fmu" in result.stderr
-    assert "build_fmu.py" in result.stderr
+    assert "such as `trpac fmu build` makes" in result.stderr
 
 
 ONE_ROW = pd.DataFrame({name: [1.0] for name in INPUTS})
